@@ -46,7 +46,7 @@ from app.api.middleware.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.middleware.requests import RequestMiddleware
 from app.api.missions import alarms, fleet, forecasts, missions, orders, searches, streams, targets
 from app.api.schemas import API
-from app.api.soundings import corrections, imports, measurements, pings, soundings
+from app.api.soundings import beams, corrections, imports, measurements, pings, soundings
 from app.api.state import EdgeState
 from app.certificates import first_certificate, when_not_valid
 from app.dashboard.serve import mount_dashboard
@@ -95,6 +95,7 @@ ROUTERS = (
     web_maps.router,
     soundings.router,
     pings.router,
+    beams.router,
     targets.router,
     searches.router,
     streams.router,

@@ -75,6 +75,10 @@ class CastNotFoundError(MissionError):
     """The mission has no sound speed cast of this name."""
 
 
+class BeamEditNotFoundError(MissionError):
+    """Nothing with this number was said of the mission's beams, or it was taken back."""
+
+
 class PingsNotFoundError(MissionError):
     """The mission has no such file of pings."""
 

@@ -16,6 +16,7 @@ from app.api.http.problems import FieldProblem, Problem, ProblemError, instance_
 from app.api.http.route_parameters import query_names
 from app.missions.errors import (
     AlarmNotFoundError,
+    BeamEditNotFoundError,
     CastNotFoundError,
     ConflictError,
     FileTooLargeError,
@@ -46,6 +47,7 @@ SENT = "sent"
 
 KINDS: dict[type[MissionError], str] = {
     AlarmNotFoundError: "alarm-not-found",
+    BeamEditNotFoundError: "beam-edit-not-found",
     CastNotFoundError: "cast-not-found",
     ConflictError: "conflict",
     FileTooLargeError: "body-too-large",

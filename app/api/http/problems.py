@@ -26,6 +26,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "import-not-found": (404, "There is no such import"),
     "alarm-not-found": (404, "There is no such alarm"),
     "feature-not-found": (404, "There is no such feature"),
+    "beam-edit-not-found": (404, "Nothing with this number was said of the mission's beams"),
     "cast-not-found": (404, "The mission has no such sound speed cast"),
     "pings-not-found": (404, "There is no such file of pings"),
     "map-not-ready": (404, "There is no map yet"),

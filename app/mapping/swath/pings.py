@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.water.casts import Casts
 
@@ -105,10 +105,16 @@ class Footprints:
 
 @dataclass(frozen=True)
 class PlacedPings:
-    """Pings of one vehicle, place and attitude being the sonar's, and where their beams met the bottom."""
+    """Pings of one vehicle, place and attitude being the sonar's, and where their beams met the bottom.
+
+    ``rejected`` and ``restored``, (m,) each, tell which of the m footprints an operator took out, and which count
+    whatever their neighbours are like; None: nobody said so of any.
+    """
 
     pings: Pings
     footprints: Footprints
+    rejected: BoolArray | None = None
+    restored: BoolArray | None = None
 
 
 def reach_m(pings: Pings) -> FloatArray:

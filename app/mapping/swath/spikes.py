@@ -1,11 +1,13 @@
 """Beams that did not meet the bottom: fish, bubbles, double echoes."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.swath.pings import Pings
+from app.mapping.swath.pings import Pings, PlacedPings
 
 NEIGHBOURS = 9
 """Beams of a ping that tell together where the bottom is."""
@@ -32,6 +34,33 @@ ECHO_OF_DEPTH = 0.5
 
 _AT_ONCE = 4096
 """Doubted beams that are looked at together: it limits memory."""
+
+
+@dataclass(frozen=True)
+class BeamStates:
+    """What became of beams that met something, each of shape (m,); at most one of the three holds of each."""
+
+    spike: BoolArray
+    """Left out, because its neighbours say otherwise."""
+    rejected: BoolArray
+    """Left out by an operator."""
+    restored: BoolArray
+    """Counts because an operator says so."""
+
+    @property
+    def used(self) -> BoolArray:
+        """Which of them count."""
+        return np.asarray(~self.spike & ~self.rejected)
+
+
+def states_of(placed: PlacedPings) -> BeamStates:
+    """Return what became of beams, (m,) as their footprints; which are spikes does not depend on what operators say."""
+    pings = placed.pings
+    spike = spikes(pings)[np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad)]
+    none = np.zeros(len(spike), dtype=np.bool_)
+    rejected = none if placed.rejected is None else placed.rejected
+    restored = none if placed.restored is None else placed.restored
+    return BeamStates(spike & ~rejected & ~restored, rejected, restored)
 
 
 def spikes(pings: Pings) -> BoolArray:

@@ -7,6 +7,7 @@ from typing import Any
 from app.mapping.water.tides import TideTable
 from app.missions.live.journals.journal import Counts
 from app.missions.soundings.adjustment import TrackAdjustment
+from app.missions.soundings.beam_edits import BeamEdit
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.mounting import MountingSpec
 from app.missions.states import MissionState
@@ -60,3 +61,5 @@ class StoredMission:
     """How far tracks are moved; None: they stay as they were reported."""
     mountings: Mapping[str, MountingSpec] = field(default_factory=dict)
     """How its vehicles, also those that left, say that their sonars are mounted."""
+    beam_edits: Mapping[int, BeamEdit] = field(default_factory=dict)
+    """What operators said of beams, by number, in the order in which they said it."""

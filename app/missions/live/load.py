@@ -16,6 +16,7 @@ from app.missions.live.threads import Threads
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment
+from app.missions.soundings.beam_edits import edit_of
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import AT_SEA, ENDED
@@ -27,6 +28,7 @@ from app.storage.ping_files import PingFiles
 from app.storage.queries import alarms as alarm_queries
 from app.storage.queries import events as event_queries
 from app.storage.queries import missions as mission_queries
+from app.storage.queries import pings as ping_queries
 from app.storage.queries import scans as scan_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import stored_maps
@@ -53,6 +55,7 @@ async def take_up(
         reference = await sounding_queries.reference_grid(session, row.id)
         tide = await session.get(TideTableRow, row.id)
         drift = await session.get(AdjustmentRow, row.id)
+        edited = await ping_queries.beam_edits(session, row.id)
         heard = await telemetry_queries.last_heard(session, row.id)
         batteries = await telemetry_queries.last_batteries(session, row.id)
         standing = await alarm_queries.standing(session, row.id) if row.state in AT_SEA else []
@@ -66,6 +69,7 @@ async def take_up(
     adjustment = None
     if drift is not None:
         adjustment = await loop.run_in_executor(threads.planning, TrackAdjustment.unpack, drift.content)
+    edits = {one.id: await loop.run_in_executor(threads.planning, edit_of, one) for one in edited}
     search = None
     if spec.search is not None:
         search = await loop.run_in_executor(threads.planning, Search, spec, spec.search, spec.frame(), time_scale)
@@ -74,7 +78,7 @@ async def take_up(
     builder = await asyncio.to_thread(builder_of, spec)
     described = [VehicleSpec.model_validate(vehicle.spec) for vehicle in vehicles]
     mountings = {one.name: one.mounting for one in described}
-    mission = StoredMission(row, spec, counts, table, adjustment, mountings)
+    mission = StoredMission(row, spec, counts, table, adjustment, mountings, edits)
     live = LiveMission(database, hub, threads, ping_files, time_scale, mission, search, builder)
     async with database.reading() as session:
         pinged = await live.pings.open(session)

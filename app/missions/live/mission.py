@@ -48,6 +48,7 @@ from app.missions.search.mates import Mates
 from app.missions.search.progress import progress_of
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
+from app.missions.soundings.beam_edits import BeamEdit, rulings_of
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.budget import Budget
@@ -104,7 +105,11 @@ class LiveMission:
         """Who does heavy work; None: this process alone."""
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
-        corrections = Corrections.of(spec, self.frame, stored.tide_table, stored.adjustment, stored.mountings)
+        corrections = Corrections.of(
+            spec, self.frame, stored.tide_table, stored.adjustment, stored.mountings, rulings_of(stored.beam_edits)
+        )
+        self.beam_edits = dict(stored.beam_edits)
+        """What operators said of beams, by number, in the order in which they said it."""
         self.stated_mountings = dict(stored.mountings)
         """How its vehicles, also those that left, say that their sonars are mounted."""
         self.gate = self._gate_with(corrections)
@@ -320,6 +325,14 @@ class LiveMission:
         self.journal.tell_of_missing_level()
         self.revision += 1
 
+    def edit_beams(self, edits: Mapping[int, BeamEdit]) -> None:
+        """Let operators have said this of beams, as the database has it; the caller holds the journal's ``writing``."""
+        self.beam_edits = dict(edits)
+        self.gate.corrections = self.gate.corrections.ruled(rulings_of(edits))
+        self.swath.correct(self.gate.corrections)
+        self.recount(self.journal.counts)
+        self.revision += 1
+
     def state_mounting(self, vehicle: str, mounting: MountingSpec) -> None:
         """Note how the sonar of a vehicle that joins is mounted; nothing was sounded by it under another mounting."""
         if mounting == self.stated_mountings.get(vehicle, MountingSpec()):
@@ -327,7 +340,7 @@ class LiveMission:
         self.stated_mountings[vehicle] = mounting
         before = self.gate.corrections
         self.gate.corrections = Corrections.of(
-            self.spec, self.frame, before.table, before.adjustment, self.stated_mountings
+            self.spec, self.frame, before.table, before.adjustment, self.stated_mountings, before.rulings
         )
         self.swath.correct(self.gate.corrections)
 
@@ -348,6 +361,7 @@ class LiveMission:
         """Note that stored soundings changed, of which there are so many now."""
         self.journal.counts = counts
         self.stored_soundings.changed()
+        self.feed.of_changes(self.header.step)
         self._note_late_change()
 
     def halt(self) -> None:

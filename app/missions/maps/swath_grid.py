@@ -13,7 +13,7 @@ from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map
 from app.mapping.swath.holidays import open_ground, side_of
 from app.mapping.swath.pings import Footprints, Pings, PlacedPings
-from app.mapping.swath.spikes import spikes
+from app.mapping.swath.spikes import states_of
 from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap, Grid, SoundingRows
 
@@ -23,7 +23,7 @@ Place = Callable[[str, Pings], PlacedPings | None]
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams that met the bottom, spikes left out: whose pings they are of, where, and how uncertain that is.
+    """Beams that count, not spikes and rejected ones: whose pings they are of, where they met the bottom, how surely.
 
     Place and attitude of the pings are the sonar's.
     """
@@ -44,9 +44,7 @@ def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -
     if there is None:
         return None
     pings, beams = there.pings, there.footprints
-    wrong = spikes(pings)
-    keep = ~wrong[np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad)] & np.isfinite(beams.depth_m)
-    found = beams.take(keep)
+    found = beams.take(states_of(there).used & np.isfinite(beams.depth_m))
     went = BeamGeometry(
         angle_rad=found.angle_rad - pings.roll_rad[found.ping],
         down_m=np.abs(found.depth_m - pings.depth_m[found.ping]),
@@ -65,7 +63,7 @@ class SwathGrid:
         self._density = DensityGrid(grid, mask)
         self._lock = threading.Lock()
         self.beams = 0
-        """How many were taken in, spikes left out."""
+        """How many were taken in, spikes and rejected ones left out."""
 
     def empty(self) -> "SwathGrid":
         """Return one of the same cells that has taken in nothing."""

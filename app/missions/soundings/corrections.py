@@ -5,6 +5,7 @@ The report itself stays as it came.
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.mounting import STRAIGHT, BeamVectors, Mounting, StatedTrack, displaced, mounted
 from app.mapping.swath.pings import Pings, PlacedPings, placed
+from app.mapping.swath.rulings import NO_RULINGS, BeamRulings
 from app.mapping.water.casts import CastPlaces, Casts
 from app.mapping.water.sound_speed import SoundSpeedProfile
 from app.mapping.water.tides import TideTable
@@ -109,6 +111,8 @@ class Corrections:
         What is always wrong with sonars and water levels.
     mountings
         How sonars are mounted, by vehicle.
+    rulings
+        What operators say of beams; None: nothing.
     """
 
     def __init__(
@@ -121,6 +125,7 @@ class Corrections:
         adjustment: TrackAdjustment | None = None,
         systematic: SystematicErrors | None = None,
         mountings: Mapping[str, MountingSpec] | None = None,
+        rulings: BeamRulings | None = None,
     ) -> None:
         self._frame = frame
         self._tide = tide
@@ -132,6 +137,7 @@ class Corrections:
         self._residual = np.array(self._systematic.water_level, dtype=float).reshape(-1, 2)
         self._mountings = {name: one for name, one in (mountings or {}).items() if not one.is_ideal}
         self._applied = {name: one.mounting for name, one in self._mountings.items()}
+        self.rulings = rulings or NO_RULINGS
         self._assumed_mps = ASSUMED_MPS if sound_speed is None else sound_speed.assumed_mps
 
     @classmethod
@@ -142,10 +148,12 @@ class Corrections:
         table: TideTable | None,
         adjustment: TrackAdjustment | None,
         stated: Mapping[str, MountingSpec],
+        rulings: BeamRulings | None,
     ) -> "Corrections":
         """Return the corrections that a mission's description states, with its tide table and adjustment.
 
-        ``stated``: how its vehicles say that their sonars are mounted, which the description may correct.
+        ``stated``: how its vehicles say that their sonars are mounted, which the description may correct. ``rulings``:
+        what operators say of beams.
         """
         return cls(
             frame,
@@ -155,6 +163,7 @@ class Corrections:
             adjustment=adjustment,
             systematic=spec.systematic_errors,
             mountings={**stated, **spec.mountings},
+            rulings=rulings,
         )
 
     @property
@@ -258,7 +267,16 @@ class Corrections:
             found = replace(found, east_m=found.east_m - off[:, 0], north_m=found.north_m - off[:, 1])
         levels, wrong_m = self._levels(pings.time_s), self._errors_of(vehicle).depth_m
         depth_m = found.depth_m - wrong_m - levels[found.ping] + self._tide.datum_offset_m
-        return PlacedPings(pings, replace(found, depth_m=depth_m))
+        met, beams = np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad), pings.range_m.shape[1]
+        said = [one.get(vehicle) for one in (self.rulings.rejected, self.rulings.restored)]
+        rejected, restored = (None if one is None else one.among(pings.time_s, beams)[met] for one in said)
+        return PlacedPings(pings, replace(found, depth_m=depth_m), rejected, restored)
+
+    def ruled(self, rulings: BeamRulings) -> "Corrections":
+        """Return the same corrections with other words of operators on beams."""
+        found = copy(self)
+        found.rulings = rulings
+        return found
 
     def mounting_of(self, vehicle: str) -> Mounting:
         """Return how a vehicle's sonar is taken to be mounted."""

@@ -62,7 +62,7 @@ class MapMessage(View):
 
     type: Literal["map"] = "map"
     version: int
-    live: int = Field(default=0, description="Grows with what was sounded since: the tiles show it at once")
+    live: int = Field(default=0, description="Grows with what was sounded or corrected since: the tiles show it")
     step: int
     min_depth_m: float | None
     max_depth_m: float | None

@@ -7,7 +7,15 @@ from app.storage.models.access import AuditRow, SessionRow, TokenRow
 from app.storage.models.alarms import AlarmDeliveryRow, AlarmRow
 from app.storage.models.base import Base
 from app.storage.models.maps import AdjustmentRow, ImportRow, ReferenceRow, StoredMapRow, TideTableRow
-from app.storage.models.measurements import LogRow, PositionRow, ScanRow, SoundingRow, TargetRangeRow, TelemetryRow
+from app.storage.models.measurements import (
+    BeamEditRow,
+    LogRow,
+    PositionRow,
+    ScanRow,
+    SoundingRow,
+    TargetRangeRow,
+    TelemetryRow,
+)
 from app.storage.models.missions import (
     BatchRow,
     EventRow,
@@ -28,6 +36,7 @@ __all__ = [
     "AuditRow",
     "Base",
     "BatchRow",
+    "BeamEditRow",
     "ConsoleRow",
     "EventRow",
     "ImportRow",

@@ -77,6 +77,28 @@ class LogRow(Base):
     taken_back_by: Mapped[str | None] = mapped_column(String(200))
 
 
+class BeamEditRow(Base):
+    """What an operator once said of some beams of swath sonars: they are rejected, or restored.
+
+    ``content`` holds which (``missions/soundings/beam_edits.py``).
+    """
+
+    __tablename__ = "beam_edits"
+    __table_args__ = (
+        Index("ix_beam_edits_mission", "mission_id", "id"),
+        # The number of an edit that was taken back must never be another one's.
+        {"sqlite_autoincrement": True},
+    )
+
+    id: Mapped[int] = mapped_column(BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    made_at: Mapped[datetime]
+    actor: Mapped[str] = mapped_column(String(120))
+    ruling: Mapped[str] = mapped_column(String(16))
+    note: Mapped[str] = mapped_column(Text, default="")
+    content: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class TargetRangeRow(Base):
     """A range that a vehicle measured to a moving target, in the order in which they were judged."""
 

@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, or_, select, true
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import defer
 
-from app.storage.models import PingBlockRow, PingChunkRow
+from app.storage.models import BeamEditRow, PingBlockRow, PingChunkRow
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,12 @@ async def add_blocks(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> N
     """Store blocks in their order."""
     if rows:
         await session.execute(insert(PingBlockRow), list(rows))
+
+
+async def beam_edits(session: AsyncSession, mission_id: str) -> Sequence[BeamEditRow]:
+    """Return what operators said of beams, in the order in which they said it."""
+    query = select(BeamEditRow).where(BeamEditRow.mission_id == mission_id).order_by(BeamEditRow.id)
+    return (await session.scalars(query)).all()
 
 
 def _not_of(table: type[PingBlockRow] | type[PingChunkRow], without: Collection[int]) -> ColumnElement[bool]:

@@ -12,6 +12,7 @@ from app.storage.models import (
     AlarmRow,
     AuditRow,
     BatchRow,
+    BeamEditRow,
     ConsoleRow,
     EventRow,
     ImportRow,
@@ -257,6 +258,7 @@ def one_of_each() -> list[list[Any]]:
                 taken_back_at=TIME,
                 taken_back_by="me",
             ),
+            BeamEditRow(mission_id="m1", made_at=TIME, actor="me", ruling="rejected", note="fish", content=b"beams"),
             TargetRangeRow(**target_range()),
             ScanRow(**scan()),
             VehicleOrderRow(

@@ -89,6 +89,10 @@ class LiveFeed:
         self._map = self._map.model_copy(update={"live": self._map.live + count, "step": step})
         self._soundings_are_news = True
 
+    def of_changes(self, step: int) -> None:
+        """Tell soon that what is stored counts in another way than before: it makes another map."""
+        self.of_soundings(1, step)
+
     async def _tick(self) -> None:
         while self._broadcaster.watched:
             self._broadcaster.publish(self._vehicles())

@@ -24,7 +24,7 @@ from app.mapping.swath.patch_test import (
     with_only,
 )
 from app.mapping.swath.pings import Footprints, Pings
-from app.mapping.swath.spikes import spikes
+from app.mapping.swath.spikes import states_of
 from app.missions.errors import ConflictError
 from app.missions.live.mission import LiveMission
 from app.missions.operations.corrections.recorrection import check_who_sounded, placed_files
@@ -219,14 +219,14 @@ class _Survey:
         return estimate(beams, now, self._height_m, errors, lambda: not left.is_set())
 
     def _met(self, pings: Pings, place: Placing) -> _Met | None:
-        """Return where beams met the bottom, spikes and what has no line or depth left out."""
+        """Return where beams met the bottom, spikes, rejected ones and what has no line or depth left out."""
         there = place(self._vehicle, pings)
         if there is None:
             return None
         at: Footprints = there.footprints
         line = self.passes.of(pings.time_s, pings.heading_rad)
         detected = np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad)
-        good = (line[at.ping] >= 0) & np.isfinite(at.depth_m) & ~spikes(there.pings)[detected]
+        good = (line[at.ping] >= 0) & np.isfinite(at.depth_m) & states_of(there).used
         known = detected.copy()
         known[detected] = good
         return _Met(np.column_stack([at.east_m, at.north_m])[good], line[at.ping][good], known)

@@ -52,7 +52,7 @@ CORRECTIONS = {"tide", "sound_speed", "systematic_errors", "mountings"}
 
 def corrections_view(live: LiveMission) -> CorrectionsView:
     """Return a mission's corrections as they are shown."""
-    table = live.gate.corrections.table
+    table, rulings = live.gate.corrections.table, live.gate.corrections.rulings
     return CorrectionsView(
         tide=live.spec.tide,
         tide_table=table
@@ -67,6 +67,8 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
         sound_speed=live.spec.sound_speed,
         systematic_errors=live.spec.systematic_errors,
         mountings=_mountings(live),
+        rejected_beams=rulings.rejected_beams,
+        restored_beams=rulings.restored_beams,
         vertical_datum=live.facts.vertical_datum.statement,
         accepted=live.journal.counts.accepted,
         rejected=live.journal.counts.rejected,
@@ -286,7 +288,7 @@ async def recorrect(
     store: Callable[[AsyncSession], Awaitable[None]],
 ) -> None:
     """Correct every stored sounding anew; ``store`` writes what else changes. The caller holds ``correcting``."""
-    corrections = Corrections.of(spec, live.frame, table, adjustment, live.stated_mountings)
+    corrections = Corrections.of(spec, live.frame, table, adjustment, live.stated_mountings, None)
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
@@ -301,7 +303,9 @@ async def recorrect(
             await stored_maps.forget(session, live.id)
             counted = await sounding_queries.counts(session, live.id)
         # Committed: from here on nothing waits until all of it holds. Who joined meanwhile has sounded nothing yet.
-        corrections = Corrections.of(spec, live.frame, table, adjustment, live.stated_mountings)
+        corrections = Corrections.of(
+            spec, live.frame, table, adjustment, live.stated_mountings, live.gate.corrections.rulings
+        )
         counts = live.journal.counts.of_soundings(counted.get("accepted", 0), counted.get("rejected", 0))
         live.recorrect(spec, corrections, counts)
     live.changed.set()

@@ -167,6 +167,9 @@ def corrections(w: Writer) -> list[Block]:
     if answers.at(f"{systematic}.water_level"):
         facts.append((t("fact_residual"), t("residual", count=t.number(len(answers.at(f"{systematic}.water_level"))))))
     facts += _mountings(w)
+    for name in ("rejected_beams", "restored_beams"):
+        if answers.at(f"corrections.{name}"):
+            facts.append((t(f"fact_{name}"), w.number(f"corrections.{name}")))
     facts += [
         (t("fact_draught"), t("draught")),
         (t("fact_waterline"), w.number("mission.spec.uncertainty.waterline_m", 3, "m")),

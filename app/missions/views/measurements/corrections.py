@@ -55,6 +55,8 @@ class CorrectionsView(View):
     sound_speed: SoundSpeed | None
     systematic_errors: SystematicErrors
     mountings: list[MountingView] = Field(description="How sonars are mounted, a line for each vehicle")
+    rejected_beams: int = Field(description="Beams of swath sonars that operators took out")
+    restored_beams: int = Field(description="Beams that count because operators say so, whatever their neighbours")
     vertical_datum: str = Field(description="What corrected depths are counted from")
     accepted: int = Field(description="Soundings accepted under these corrections")
     rejected: int

@@ -120,6 +120,9 @@ Response: TypeAlias = Annotated[Literal["warn", "hold", "return", "surface", "st
 Role: TypeAlias = Annotated[Literal["viewer", "vehicle", "operator", "admin"], Open]
 """What the holder of a token may do."""
 
+Ruling: TypeAlias = Annotated[Literal["restored", "rejected"], Open]
+"""What an operator said of a sounding."""
+
 Sensor: TypeAlias = Annotated[Literal["single_beam", "dvl", "multibeam"], Open]
 """How a vehicle sounds the bottom."""
 
@@ -331,6 +334,108 @@ class BatchVerdict(Model):
     items: list[ItemVerdict]
     replayed: bool
     """True: this idempotency key was seen before, this is the first answer"""
+
+
+class BeamEditView(Model):
+    """What an operator once said of some beams."""
+
+    id: int
+    ruling: Ruling
+    beams: int
+    """How many these are"""
+    vehicles: list[str]
+    """Whose they are"""
+    selection: BeamSelection | None
+    """What was asked for; null: each beam was named"""
+    made_at: datetime
+    actor: str
+    note: str
+
+
+class BeamEditsView(Model):
+    """All that operators said of a mission's beams, oldest first: of each beam the last word counts."""
+
+    rejected: int
+    """Beams that do not count"""
+    restored: int
+    """Beams that count whatever their neighbours are like"""
+    edits: list[BeamEditView]
+
+
+class BeamPoints(Model):
+    """Beams as points, column by column, in the order in which vehicles and their pings came."""
+
+    total: int
+    """Beams of the selection that met the bottom; where `every` is 1 all are here"""
+    every: int
+    """Pings of which one was taken: 1, 2, 4, …"""
+    lon_deg: list[float]
+    lat_deg: list[float]
+    depth_m: list[float]
+    """Below the datum, as corrected now"""
+    state: list[int]
+    """Places in `states`"""
+    ping: list[int]
+    """Places in `time_s` and `vehicle`"""
+    beam: list[int]
+    """Place in the ping, the first of which is 0"""
+    time_s: list[float]
+    """Of each ping, by the vehicle's clock, Unix seconds"""
+    vehicle: list[int]
+    """Of each ping, places in `vehicles`"""
+    states: list[SoundingState]
+    vehicles: list[str]
+
+
+class BeamPointsRequest(Model):
+    """Which beams are asked for as points."""
+
+    area: PolygonGeometry | None = None
+    """They met the bottom in here"""
+    vehicle: str | None = None
+    """They are of this vehicle"""
+    from_s: float | None = None
+    """Not before this time of the vehicle's clock, Unix seconds"""
+    until_s: float | None = None
+    """Not after this time of the vehicle's clock, Unix seconds"""
+    least_depth_m: float | None = None
+    """Not shoaler than this, metres below the datum, as corrected now"""
+    most_depth_m: float | None = None
+    """Not deeper than this, metres below the datum, as corrected now"""
+    least_angle_deg: float | None = None
+    """Outer beams: at least so far to either side from straight down in the vehicle, degrees"""
+    limit: int = 50000
+    """Most points in the answer. Of more beams those of every second ping, or fourth, and so on come"""
+
+
+class BeamRulingRequest(Model):
+    """Which beams an operator decides about, by what they have in common or one by one."""
+
+    selection: BeamSelection | None = None
+    """By what they have in common"""
+    pings: list[NamedBeams] | None = None
+    """One by one"""
+    note: str = ""
+    """Why; kept in the log"""
+
+
+class BeamSelection(Model):
+    """Which beams of a mission's swath sonars are meant: those that fulfil all that is stated."""
+
+    area: PolygonGeometry | None = None
+    """They met the bottom in here"""
+    vehicle: str | None = None
+    """They are of this vehicle"""
+    from_s: float | None = None
+    """Not before this time of the vehicle's clock, Unix seconds"""
+    until_s: float | None = None
+    """Not after this time of the vehicle's clock, Unix seconds"""
+    least_depth_m: float | None = None
+    """Not shoaler than this, metres below the datum, as corrected now"""
+    most_depth_m: float | None = None
+    """Not deeper than this, metres below the datum, as corrected now"""
+    least_angle_deg: float | None = None
+    """Outer beams: at least so far to either side from straight down in the vehicle, degrees"""
 
 
 class Block(Model):
@@ -556,6 +661,10 @@ class CorrectionsView(Model):
     systematic_errors: SystematicErrors
     mountings: list[MountingView]
     """How sonars are mounted, a line for each vehicle"""
+    rejected_beams: int
+    """Beams of swath sonars that operators took out"""
+    restored_beams: int
+    """Beams that count because operators say so, whatever their neighbours"""
     vertical_datum: str
     """What corrected depths are counted from"""
     accepted: int
@@ -1133,7 +1242,7 @@ class MapMessage(Model):
     type: Literal["map"]
     version: int
     live: int
-    """Grows with what was sounded since: the tiles show it at once"""
+    """Grows with what was sounded or corrected since: the tiles show it"""
     step: int
     min_depth_m: float | None
     max_depth_m: float | None
@@ -1408,6 +1517,16 @@ class MountingView(Model):
     """As the vehicle was described when it joined"""
     corrected: MountingSpec | None
     """What counts in place of that; null: what is stated counts"""
+
+
+class NamedBeams(Model):
+    """Some beams of one ping."""
+
+    vehicle: str
+    time_s: float
+    """Time of the ping by the vehicle's clock, Unix seconds, to the last digit"""
+    beams: list[int]
+    """Their places in the ping, the first of which is 0"""
 
 
 class NewCasts(Model):

@@ -1410,6 +1410,49 @@ class Operations(ABC):
         """Fetch a file of pings: ``GET /missions/{mission_id}/pings/{number}``."""
         return self._call(Call[bytes]("GET", f"/missions/{part(mission_id)}/pings/{part(number)}", bytes))
 
+    def select_beams(self, mission_id: str, body: models.BeamPointsRequest | Mapping[str, Any]) -> models.BeamPoints:
+        """See beams as points: ``POST /missions/{mission_id}/beams/points``."""
+        return self._call(Call[models.BeamPoints](
+            "POST",
+            f"/missions/{part(mission_id)}/beams/points",
+            models.BeamPoints,
+            body=body,
+        ))
+
+    def reject_beams(self, mission_id: str, body: models.BeamRulingRequest | Mapping[str, Any]) -> models.BeamEditView:
+        """Keep beams out: ``POST /missions/{mission_id}/beams/reject``."""
+        return self._call(Call[models.BeamEditView](
+            "POST",
+            f"/missions/{part(mission_id)}/beams/reject",
+            models.BeamEditView,
+            body=body,
+        ))
+
+    def restore_beams(self, mission_id: str, body: models.BeamRulingRequest | Mapping[str, Any]) -> models.BeamEditView:
+        """Let beams count: ``POST /missions/{mission_id}/beams/restore``."""
+        return self._call(Call[models.BeamEditView](
+            "POST",
+            f"/missions/{part(mission_id)}/beams/restore",
+            models.BeamEditView,
+            body=body,
+        ))
+
+    def list_beam_edits(self, mission_id: str) -> models.BeamEditsView:
+        """See what was said of beams: ``GET /missions/{mission_id}/beams/edits``."""
+        return self._call(Call[models.BeamEditsView](
+            "GET",
+            f"/missions/{part(mission_id)}/beams/edits",
+            models.BeamEditsView,
+        ))
+
+    def withdraw_beam_edit(self, mission_id: str, edit_id: int) -> models.BeamEditsView:
+        """Take back what was said of beams: ``DELETE /missions/{mission_id}/beams/edits/{edit_id}``."""
+        return self._call(Call[models.BeamEditsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/beams/edits/{part(edit_id)}",
+            models.BeamEditsView,
+        ))
+
     def list_targets(self, mission_id: str) -> list[models.TargetView]:
         """See what is known of a mission's moving targets: ``GET /missions/{mission_id}/targets``."""
         return self._call(Call[list[models.TargetView]](
@@ -3105,6 +3148,61 @@ class AsyncOperations(ABC):
     async def get_pings(self, mission_id: str, number: int) -> bytes:
         """Fetch a file of pings: ``GET /missions/{mission_id}/pings/{number}``."""
         return await self._call(Call[bytes]("GET", f"/missions/{part(mission_id)}/pings/{part(number)}", bytes))
+
+    async def select_beams(
+        self,
+        mission_id: str,
+        body: models.BeamPointsRequest | Mapping[str, Any],
+    ) -> models.BeamPoints:
+        """See beams as points: ``POST /missions/{mission_id}/beams/points``."""
+        return await self._call(Call[models.BeamPoints](
+            "POST",
+            f"/missions/{part(mission_id)}/beams/points",
+            models.BeamPoints,
+            body=body,
+        ))
+
+    async def reject_beams(
+        self,
+        mission_id: str,
+        body: models.BeamRulingRequest | Mapping[str, Any],
+    ) -> models.BeamEditView:
+        """Keep beams out: ``POST /missions/{mission_id}/beams/reject``."""
+        return await self._call(Call[models.BeamEditView](
+            "POST",
+            f"/missions/{part(mission_id)}/beams/reject",
+            models.BeamEditView,
+            body=body,
+        ))
+
+    async def restore_beams(
+        self,
+        mission_id: str,
+        body: models.BeamRulingRequest | Mapping[str, Any],
+    ) -> models.BeamEditView:
+        """Let beams count: ``POST /missions/{mission_id}/beams/restore``."""
+        return await self._call(Call[models.BeamEditView](
+            "POST",
+            f"/missions/{part(mission_id)}/beams/restore",
+            models.BeamEditView,
+            body=body,
+        ))
+
+    async def list_beam_edits(self, mission_id: str) -> models.BeamEditsView:
+        """See what was said of beams: ``GET /missions/{mission_id}/beams/edits``."""
+        return await self._call(Call[models.BeamEditsView](
+            "GET",
+            f"/missions/{part(mission_id)}/beams/edits",
+            models.BeamEditsView,
+        ))
+
+    async def withdraw_beam_edit(self, mission_id: str, edit_id: int) -> models.BeamEditsView:
+        """Take back what was said of beams: ``DELETE /missions/{mission_id}/beams/edits/{edit_id}``."""
+        return await self._call(Call[models.BeamEditsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/beams/edits/{part(edit_id)}",
+            models.BeamEditsView,
+        ))
 
     async def list_targets(self, mission_id: str) -> list[models.TargetView]:
         """See what is known of a mission's moving targets: ``GET /missions/{mission_id}/targets``."""

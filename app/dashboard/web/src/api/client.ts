@@ -5,6 +5,10 @@ import type {
   AdjustmentView,
   AlarmReport,
   AlarmView,
+  BeamEditsView,
+  BeamEditView,
+  BeamPoints,
+  BeamSelection,
   Budget,
   CastRules,
   CastsView,
@@ -27,6 +31,7 @@ import type {
   MissionView,
   MountingEstimateView,
   MountingSpec,
+  NamedBeams,
   NewCasts,
   NewMission,
   NewSite,
@@ -221,6 +226,9 @@ const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/$
 
 const sitePath = (id: string, part = "") => `/sites/${encodeURIComponent(id)}${part && `/${part}`}`;
 
+/** Beams by what they have in common, or one by one. */
+export type WhichBeams = { selection: BeamSelection } | { pings: readonly NamedBeams[] };
+
 /** Which two surveys are compared, by their missions; empty: the newest that can be. */
 export interface Compared {
   from: string;
@@ -329,6 +337,19 @@ export const api = {
     request<SoundingPoints>(`${missionPath(id)}/soundings/points?after=${after}`, { signal: gone }),
   ruleMany: (id: string, ids: readonly number[], ruling: "restore" | "reject", note: string) =>
     post<RulingsView>(`${missionPath(id)}/soundings/${ruling}`, { ids, note }, STORED),
+  /** Beams of a selection as points; of very many those of some pings. It takes as long as it takes. */
+  beamPoints: (id: string, selection: BeamSelection, gone: AbortSignal) =>
+    request<BeamPoints>(`${missionPath(id)}/beams/points`, {
+      method: "POST",
+      body: JSON.stringify(selection),
+      headers: { "Content-Type": "application/json" },
+      signal: gone,
+    }),
+  ruleBeams: (id: string, ruling: "restore" | "reject", which: WhichBeams, note: string) =>
+    post<BeamEditView>(`${missionPath(id)}/beams/${ruling}`, { ...which, note }, STORED),
+  beamEdits: (id: string) => request<BeamEditsView>(`${missionPath(id)}/beams/edits`),
+  withdrawBeamEdit: (id: string, edit: number) =>
+    request<BeamEditsView>(`${missionPath(id)}/beams/edits/${edit}`, { method: "DELETE" }, STORED),
   rule: (id: string, sounding: number, ruling: "restore" | "reject", note: string) =>
     post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }, STORED),
   corrections: (id: string) => request<CorrectionsView>(`${missionPath(id)}/corrections`),

@@ -1708,6 +1708,111 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/beams/points": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * See beams as points
+         * @description Return the beams of a selection column by column, whatever became of them: enough to draw them in space.
+         *
+         *     Nothing stated: all. With more beams than `limit` those of every second ping come, or fourth, and so on.
+         */
+        post: operations["selectBeams"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/beams/reject": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep beams out
+         * @description Take beams out of the map and of all that is made of it, by a selection or one by one.
+         *
+         *     Their values stay. It goes by beam, not by place: however they are corrected later, these are out, and no others.
+         *     Pings that come later are not concerned.
+         */
+        post: operations["rejectBeams"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/beams/restore": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Let beams count
+         * @description Take beams into the map whatever their neighbours are like: those left out as spikes, and rejected ones.
+         */
+        post: operations["restoreBeams"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/beams/edits": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what was said of beams
+         * @description Return what operators said of beams, in the order in which they did: of each beam the last word counts.
+         */
+        get: operations["listBeamEdits"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/beams/edits/{edit_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Take back what was said of beams
+         * @description Take an edit back: what was said of its beams before it counts again.
+         */
+        delete: operations["withdrawBeamEdit"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/targets": {
         parameters: {
             query?: never;
@@ -2631,6 +2736,210 @@ export interface components {
          */
         BatteryState: "ok" | "low" | "critical";
         /**
+         * BeamEditView
+         * @description What an operator once said of some beams.
+         */
+        BeamEditView: {
+            /** Id */
+            id: number;
+            ruling: components["schemas"]["Ruling"];
+            /**
+             * Beams
+             * @description How many these are
+             */
+            beams: number;
+            /**
+             * Vehicles
+             * @description Whose they are
+             */
+            vehicles: string[];
+            /** @description What was asked for; null: each beam was named */
+            selection: components["schemas"]["BeamSelection"] | null;
+            /**
+             * Made At
+             * Format: date-time
+             */
+            made_at: string;
+            /** Actor */
+            actor: string;
+            /** Note */
+            note: string;
+        };
+        /**
+         * BeamEditsView
+         * @description All that operators said of a mission's beams, oldest first: of each beam the last word counts.
+         */
+        BeamEditsView: {
+            /**
+             * Rejected
+             * @description Beams that do not count
+             */
+            rejected: number;
+            /**
+             * Restored
+             * @description Beams that count whatever their neighbours are like
+             */
+            restored: number;
+            /** Edits */
+            edits: components["schemas"]["BeamEditView"][];
+        };
+        /**
+         * BeamPoints
+         * @description Beams as points, column by column, in the order in which vehicles and their pings came.
+         */
+        BeamPoints: {
+            /**
+             * Total
+             * @description Beams of the selection that met the bottom; where `every` is 1 all are here
+             */
+            total: number;
+            /**
+             * Every
+             * @description Pings of which one was taken: 1, 2, 4, …
+             */
+            every: number;
+            /** Lon Deg */
+            lon_deg: number[];
+            /** Lat Deg */
+            lat_deg: number[];
+            /**
+             * Depth M
+             * @description Below the datum, as corrected now
+             */
+            depth_m: number[];
+            /**
+             * State
+             * @description Places in `states`
+             */
+            state: number[];
+            /**
+             * Ping
+             * @description Places in `time_s` and `vehicle`
+             */
+            ping: number[];
+            /**
+             * Beam
+             * @description Place in the ping, the first of which is 0
+             */
+            beam: number[];
+            /**
+             * Time S
+             * @description Of each ping, by the vehicle's clock, Unix seconds
+             */
+            time_s: number[];
+            /**
+             * Vehicle
+             * @description Of each ping, places in `vehicles`
+             */
+            vehicle: number[];
+            /** States */
+            states: components["schemas"]["SoundingState"][];
+            /** Vehicles */
+            vehicles: string[];
+        };
+        /**
+         * BeamPointsRequest
+         * @description Which beams are asked for as points.
+         */
+        BeamPointsRequest: {
+            /** @description They met the bottom in here */
+            area?: components["schemas"]["PolygonGeometry"] | null;
+            /**
+             * Vehicle
+             * @description They are of this vehicle
+             */
+            vehicle?: string | null;
+            /**
+             * From S
+             * @description Not before this time of the vehicle's clock, Unix seconds
+             */
+            from_s?: number | null;
+            /**
+             * Until S
+             * @description Not after this time of the vehicle's clock, Unix seconds
+             */
+            until_s?: number | null;
+            /**
+             * Least Depth M
+             * @description Not shoaler than this, metres below the datum, as corrected now
+             */
+            least_depth_m?: number | null;
+            /**
+             * Most Depth M
+             * @description Not deeper than this, metres below the datum, as corrected now
+             */
+            most_depth_m?: number | null;
+            /**
+             * Least Angle Deg
+             * @description Outer beams: at least so far to either side from straight down in the vehicle, degrees
+             */
+            least_angle_deg?: number | null;
+            /**
+             * Limit
+             * @description Most points in the answer. Of more beams those of every second ping, or fourth, and so on come
+             * @default 50000
+             */
+            limit: number;
+        };
+        /**
+         * BeamRulingRequest
+         * @description Which beams an operator decides about, by what they have in common or one by one.
+         */
+        BeamRulingRequest: {
+            /** @description By what they have in common */
+            selection?: components["schemas"]["BeamSelection"] | null;
+            /**
+             * Pings
+             * @description One by one
+             * @default []
+             */
+            pings: components["schemas"]["NamedBeams"][];
+            /**
+             * Note
+             * @description Why; kept in the log
+             * @default
+             */
+            note: string;
+        };
+        /**
+         * BeamSelection
+         * @description Which beams of a mission's swath sonars are meant: those that fulfil all that is stated.
+         */
+        BeamSelection: {
+            /** @description They met the bottom in here */
+            area?: components["schemas"]["PolygonGeometry"] | null;
+            /**
+             * Vehicle
+             * @description They are of this vehicle
+             */
+            vehicle?: string | null;
+            /**
+             * From S
+             * @description Not before this time of the vehicle's clock, Unix seconds
+             */
+            from_s?: number | null;
+            /**
+             * Until S
+             * @description Not after this time of the vehicle's clock, Unix seconds
+             */
+            until_s?: number | null;
+            /**
+             * Least Depth M
+             * @description Not shoaler than this, metres below the datum, as corrected now
+             */
+            least_depth_m?: number | null;
+            /**
+             * Most Depth M
+             * @description Not deeper than this, metres below the datum, as corrected now
+             */
+            most_depth_m?: number | null;
+            /**
+             * Least Angle Deg
+             * @description Outer beams: at least so far to either side from straight down in the vehicle, degrees
+             */
+            least_angle_deg?: number | null;
+        };
+        /**
          * Block
          * @description The blocks of P of one mixing signal; both symmetric, with eigenvalues between e1 and e2.
          */
@@ -3124,6 +3433,16 @@ export interface components {
              * @description How sonars are mounted, a line for each vehicle
              */
             mountings: components["schemas"]["MountingView"][];
+            /**
+             * Rejected Beams
+             * @description Beams of swath sonars that operators took out
+             */
+            rejected_beams: number;
+            /**
+             * Restored Beams
+             * @description Beams that count because operators say so, whatever their neighbours
+             */
+            restored_beams: number;
             /**
              * Vertical Datum
              * @description What corrected depths are counted from
@@ -4402,7 +4721,7 @@ export interface components {
             version: number;
             /**
              * Live
-             * @description Grows with what was sounded since: the tiles show it at once
+             * @description Grows with what was sounded or corrected since: the tiles show it
              * @default 0
              */
             live: number;
@@ -5122,6 +5441,24 @@ export interface components {
             stated: components["schemas"]["MountingSpec"];
             /** @description What counts in place of that; null: what is stated counts */
             corrected: components["schemas"]["MountingSpec"] | null;
+        };
+        /**
+         * NamedBeams
+         * @description Some beams of one ping.
+         */
+        NamedBeams: {
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Time S
+             * @description Time of the ping by the vehicle's clock, Unix seconds, to the last digit
+             */
+            time_s: number;
+            /**
+             * Beams
+             * @description Their places in the ping, the first of which is 0
+             */
+            beams: number[];
         };
         /**
          * NewCasts
@@ -6300,6 +6637,12 @@ export interface components {
          * @enum {string}
          */
         Role: "viewer" | "vehicle" | "operator" | "admin";
+        /**
+         * Ruling
+         * @description What an operator said of a sounding.
+         * @enum {string}
+         */
+        Ruling: "restored" | "rejected";
         /**
          * RulingRequest
          * @description Which soundings an operator decides about, and what is added to that.
@@ -17939,6 +18282,549 @@ export interface operations {
             };
             /** @description A file of pings is missing or damaged */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    selectBeams: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BeamPointsRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BeamPoints"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    rejectBeams: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BeamRulingRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BeamEditView"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restoreBeams: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BeamRulingRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BeamEditView"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listBeamEdits: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BeamEditsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    withdrawBeamEdit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The edit's number */
+                edit_id: number;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BeamEditsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nothing with this number was said of the mission's beams */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };

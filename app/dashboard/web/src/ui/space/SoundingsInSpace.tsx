@@ -2,10 +2,18 @@ import "./SoundingsInSpace.css";
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { SoundingState } from "../../api/types";
-import type { Pixel } from "../../map/canvas/polylines";
 import { colourAt, DEPTH_PALETTES, type Palette } from "../../map/picture/palette";
-import { frameRing, within } from "../../map/space/lasso";
 import type { SeaFloorScene } from "../../map/space/scene";
+import {
+  beamArea,
+  beams,
+  doneEdits,
+  forgetBeams,
+  groundRound,
+  loadBeams,
+  ruleChosenBeams,
+  takeBackEdit,
+} from "../../state/analysis/beamCloud";
 import {
   type Cloud,
   chosenPoints,
@@ -21,9 +29,10 @@ import {
 } from "../../state/analysis/cloud";
 import { count } from "../../state/format";
 import { said } from "../../state/session";
-import { depthPalette, rangeOf, selectedId } from "../../state/store";
+import { depthPalette, mission, rangeOf, selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, flips, Typed } from "../parts/Controls";
+import { Lasso } from "./Lasso";
 
 type Colour = readonly [red: number, green: number, blue: number];
 const CHOSEN: Colour = [1, 0.1, 0.9];
@@ -60,26 +69,38 @@ function coloursOf(points: Cloud, chosen: readonly number[], palette: Palette, l
   return colours;
 }
 
-/** Steps of the frame that the keyboard moves, pixels; with Shift the fine ones. */
-const [STEP_PX, FINE_PX] = [20, 4];
-const [LEAST_PX, MOST_PX] = [8, 600];
-const GROWS = 1.25;
-
-/** All soundings as points in space; a lasso, or a frame moved by the keyboard, chooses some to be decided about. */
+/**
+ * All soundings as points in space, or the beams of swath sonars; a lasso, or a frame moved by the keyboard, chooses some
+ * to be decided about.
+ */
 export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
   const fault = useSignal("");
   const busy = useSignal(false);
   const note = useSignal("");
   const floor = useSignal(false);
   const lasso = useSignal(true);
-  const mission = selectedId.value ?? "";
+  const id = selectedId.value ?? "";
+  const { pings = 0, soundings = 0 } = mission.value?.progress ?? {};
+  const single = useSignal(pings === 0);
+  const gone = useRef(new AbortController());
 
-  useEffect(() => {
-    const gone = new AbortController();
-    forgetCloud();
-    loadCloud(mission, gone.signal).catch((error: unknown) => {
-      if (!gone.signal.aborted) fault.value = said(error);
+  const read = () => {
+    gone.current.abort();
+    gone.current = new AbortController();
+    const { signal } = gone.current;
+    const loading = single.peek() ? loadCloud(id, signal) : loadBeams(id, signal);
+    loading.catch((error: unknown) => {
+      if (!signal.aborted) fault.value = said(error);
     });
+  };
+  const readAnew = () => {
+    forgetCloud();
+    beams.value = null;
+    fault.value = "";
+    read();
+  };
+  useEffect(() => {
+    readAnew();
     let drawn = 0;
     const stops = [
       effect(() => {
@@ -94,13 +115,14 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
       effect(() => scene.setFloorShown(floor.value)),
     ];
     return () => {
-      gone.abort();
+      gone.current.abort();
       for (const stop of stops) stop();
       forgetCloud();
+      forgetBeams();
       scene.setSoundings(null);
       scene.setFloorShown(true);
     };
-  }, [scene, mission]);
+  }, [scene, id]);
 
   const act = async (what: () => Promise<void>) => {
     if (busy.value) return;
@@ -115,21 +137,40 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
       busy.value = false;
     }
   };
-  const rule = (ruling: Ruling) => void act(() => ruleChosen(mission, ruling, note.value.trim()));
-  const undo = () => void act(() => takeBack(mission, note.value.trim()));
+  const rule = (ruling: Ruling) =>
+    void act(() => (single.peek() ? ruleChosen : ruleChosenBeams)(id, ruling, note.value.trim()));
+  const undo = () =>
+    void act(() => (single.peek() ? takeBack(id, note.value.trim()) : takeBackEdit(id, gone.current.signal)));
   const points = cloud.value;
   const chosen = chosenPoints.value.length;
+  /** Of so many pings one is shown: those between them would stay. */
+  const every = single.value ? 1 : (beams.value?.every ?? 1);
+  const done = single.value ? donePoints.value.length : doneEdits.value.length;
   return (
     <>
-      {lasso.value ? <Lasso scene={scene} onReject={() => rule("reject")} onUndo={undo} /> : null}
+      {lasso.value ? (
+        <Lasso
+          scene={scene}
+          onReject={() => {
+            if (every === 1) rule("reject");
+          }}
+          onUndo={undo}
+        />
+      ) : null}
       <div class="points-tools" data-testid="points">
         <p role="status" data-testid="points-chosen">
           {points === null
             ? say("space.soundingsAreRead")
             : chosen > 0
-              ? say("space.chosenOf", { chosen: count(chosen), all: count(points.id.length) })
-              : say("space.drawRound", { all: count(points.id.length) })}
-          {points && points.total > points.id.length && points.id.length >= MOST_POINTS
+              ? say(single.value ? "space.chosenOf" : "space.chosenOfBeams", {
+                  chosen: count(chosen),
+                  all: count(points.id.length),
+                })
+              : say(single.value ? "space.drawRound" : "space.drawRoundBeams", {
+                  all: count(points.id.length),
+                })}
+          {points && every > 1 ? ` ${say("space.everyPing", { every, total: count(points.total) })}` : ""}
+          {single.value && points && points.total > points.id.length && points.id.length >= MOST_POINTS
             ? ` ${say("space.onlyTheFirst", { total: count(points.total) })}`
             : ""}
         </p>
@@ -138,7 +179,7 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
             id="points-reject"
             kind="command primary"
             commands
-            disabled={chosen === 0}
+            disabled={chosen === 0 || every > 1}
             busy={busy.value}
             onClick={() => rule("reject")}
           >
@@ -147,21 +188,51 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
           <Button
             id="points-restore"
             commands
-            disabled={chosen === 0}
+            disabled={chosen === 0 || every > 1}
             busy={busy.value}
             onClick={() => rule("restore")}
           >
             {say("review.restore")}
           </Button>
-          <Button
-            id="points-undo"
-            commands
-            disabled={donePoints.value.length === 0}
-            busy={busy.value}
-            onClick={undo}
-          >
+          <Button id="points-undo" commands disabled={done === 0} busy={busy.value} onClick={undo}>
             {say("space.undo")}
           </Button>
+          {single.value ? null : (
+            <>
+              <Button
+                id="beams-here"
+                disabled={chosen === 0}
+                onClick={() => {
+                  if (beams.value) beamArea.value = groundRound(beams.value, chosenPoints.value);
+                  readAnew();
+                }}
+              >
+                {say("space.allBeamsHere")}
+              </Button>
+              <Button
+                id="beams-everywhere"
+                disabled={!beamArea.value}
+                onClick={() => {
+                  beamArea.value = null;
+                  readAnew();
+                }}
+              >
+                {say("space.wholeSurvey")}
+              </Button>
+            </>
+          )}
+          {pings > 0 && soundings > 0 ? (
+            <Button
+              id="single-beams"
+              aria-pressed={single.value}
+              onClick={() => {
+                single.value = !single.value;
+                readAnew();
+              }}
+            >
+              {say("space.singleBeams")}
+            </Button>
+          ) : null}
           <Button id="toggle-lasso" aria-pressed={lasso.value} onClick={flips(lasso)}>
             {say("space.lasso")}
           </Button>
@@ -219,103 +290,3 @@ function Key() {
 }
 
 const css = (colour: Colour) => `rgb(${colour.map((part) => Math.round(part * 255)).join(" ")})`;
-
-interface LassoProps {
-  scene: SeaFloorScene;
-  onReject: () => void;
-  onUndo: () => void;
-}
-
-/** Drawn round points with the pointer, or a round frame for the keyboard; two fingers and the wheel turn the view. */
-function Lasso({ scene, onReject, onUndo }: LassoProps) {
-  const ring = useSignal<readonly Pixel[]>([]);
-  const frame = useSignal<{ x: number; y: number; radius: number } | null>(null);
-  const box = useRef<SVGSVGElement>(null);
-  const choose = (round: readonly Pixel[], more: boolean) => {
-    const found = within(scene.soundingsOnScreen(), round);
-    chosenPoints.value = more ? [...new Set([...chosenPoints.value, ...found])] : found;
-  };
-  const pixel = (event: PointerEvent): Pixel => {
-    const { left, top } = (box.current as SVGSVGElement).getBoundingClientRect();
-    return [event.clientX - left, event.clientY - top];
-  };
-  const middle = () => {
-    const { width, height } = (box.current as SVGSVGElement).getBoundingClientRect();
-    return { x: width / 2, y: height / 2, radius: 80 };
-  };
-  const key = (event: KeyboardEvent) => {
-    const at = frame.value ?? middle();
-    const step = event.shiftKey ? FINE_PX : STEP_PX;
-    const radius = (times: number) => Math.min(Math.max(at.radius * times, LEAST_PX), MOST_PX);
-    const keys: Record<string, () => void> = {
-      ArrowLeft: () => {
-        frame.value = { ...at, x: at.x - step };
-      },
-      ArrowRight: () => {
-        frame.value = { ...at, x: at.x + step };
-      },
-      ArrowUp: () => {
-        frame.value = { ...at, y: at.y - step };
-      },
-      ArrowDown: () => {
-        frame.value = { ...at, y: at.y + step };
-      },
-      "+": () => {
-        frame.value = { ...at, radius: radius(GROWS) };
-      },
-      "-": () => {
-        frame.value = { ...at, radius: radius(1 / GROWS) };
-      },
-      Enter: () => choose(frameRing(at), event.shiftKey),
-      Escape: () => {
-        chosenPoints.value = [];
-      },
-      Delete: onReject,
-      ...(event.ctrlKey || event.metaKey ? { z: onUndo } : {}),
-    };
-    const does = keys[event.key];
-    if (!does) return;
-    event.preventDefault();
-    event.stopPropagation();
-    does();
-  };
-  return (
-    <svg
-      ref={box}
-      class="lasso"
-      role="application"
-      // biome-ignore lint/a11y/noNoninteractiveTabindex: the keyboard moves its frame
-      tabIndex={0}
-      aria-label={say("space.lassoKeys")}
-      data-testid="lasso"
-      onKeyDown={key}
-      onFocus={(event) => {
-        if (event.currentTarget.matches(":focus-visible")) frame.value ??= middle();
-      }}
-      onBlur={() => {
-        frame.value = null;
-      }}
-      onPointerDown={(event) => {
-        event.currentTarget.setPointerCapture(event.pointerId);
-        frame.value = null;
-        ring.value = [pixel(event)];
-      }}
-      onPointerMove={(event) => {
-        if (ring.value.length > 0) ring.value = [...ring.value, pixel(event)];
-      }}
-      onPointerUp={(event) => {
-        choose(ring.value, event.shiftKey);
-        ring.value = [];
-      }}
-      onPointerCancel={() => {
-        ring.value = [];
-      }}
-      onWheel={(event) => {
-        scene.canvas.dispatchEvent(new WheelEvent("wheel", event));
-      }}
-    >
-      {ring.value.length > 1 ? <polygon points={ring.value.map((p) => p.join()).join(" ")} /> : null}
-      {frame.value ? <circle cx={frame.value.x} cy={frame.value.y} r={frame.value.radius} /> : null}
-    </svg>
-  );
-}

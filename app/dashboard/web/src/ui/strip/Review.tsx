@@ -5,9 +5,10 @@ import { api } from "../../api/client";
 import type { SoundingState, SoundingView } from "../../api/types";
 import { metres } from "../../state/format";
 import { said } from "../../state/session";
-import { chosenSounding, reviewed, selectedId, view } from "../../state/store";
+import { chosenSounding, mission, reviewed, selectedId, view } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, Choice, into, Typed } from "../parts/Controls";
+import { BeamEdits } from "./BeamEdits";
 
 const WORDS: Record<SoundingState, string> = {
   get used() {
@@ -103,6 +104,7 @@ export function Review() {
         />
         <span>{say("review.sounding", { total: total.value })}</span>
       </div>
+      {(mission.value?.progress.pings ?? 0) > 0 ? <BeamEdits /> : null}
       {fault.value ? (
         <p class="alarm" role="alert" data-testid="review-fault">
           ✕ {fault.value}
