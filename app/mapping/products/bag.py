@@ -24,12 +24,19 @@ NOT_WHOLE = "it cannot be written whole; is the disk that TMPDIR points to full?
 
 
 def bag(
-    bathymetry: BathymetricMap, frame: Frame, *, vertical_datum: VerticalDatum, title: str, common_sd_m: float
+    bathymetry: BathymetricMap,
+    frame: Frame,
+    *,
+    vertical_datum: VerticalDatum,
+    title: str,
+    common_sd_m: float,
+    counts_soundings: bool = True,
 ) -> bytes:
     """Return a BAG with elevation (positive up: minus the depth), its standard deviation and numbers of soundings.
 
     The deviation includes ``common_sd_m``, that of what all soundings share. Cells without a sounding have their
-    predicted depths: the metadata tell how many. The vertical datum stands there, too, as the system of heights above
+    predicted depths: the metadata tell how many. Where the map's counts are not of soundings, no numbers of them are
+    written. The vertical datum stands there, too, as the system of heights above
     it; the library would call it unknown. Raises OSError where the file cannot be written whole.
     """
     count = np.where(np.isfinite(bathymetry.depth_m), bathymetry.count, 0).astype("<u4")
@@ -40,13 +47,15 @@ def bag(
     with tempfile.TemporaryDirectory(prefix="bathyfleet-") as folder:
         path = Path(folder) / "map.bag"  # HDF5 writes to real files only
         try:
-            _write(path, layers, bathymetry, frame, vertical_datum, title, _predicted(bathymetry, count))
+            _write(path, layers, bathymetry, frame, vertical_datum, title, _predicted(bathymetry))
             whole = _holds(path, layers)
         except (RasterioError, SystemError) as error:
             raise OSError(errno.ENOSPC, NOT_WHOLE) from error
         if not whole:
             raise OSError(errno.ENOSPC, NOT_WHOLE)
         content = io.BytesIO(path.read_bytes())
+    if not counts_soundings:
+        return content.getvalue()
     with h5py.File(content, "r+") as file:
         numbers = file["BAG_root"].create_dataset("num_soundings", data=count, chunks=True, compression="gzip")
         numbers.attrs["min_num_soundings"], numbers.attrs["max_num_soundings"] = count.min(), count.max()
@@ -89,10 +98,10 @@ def _holds(path: Path, layers: Sequence[NDArray[np.float32]]) -> bool:
         return all(np.array_equal(file.read(number), layer) for number, layer in enumerate(layers, start=1))
 
 
-def _predicted(bathymetry: BathymetricMap, count: NDArray[np.uint32]) -> str:
+def _predicted(bathymetry: BathymetricMap) -> str:
     """Return a sentence on the cells that have a depth and no sounding."""
     known = np.isfinite(bathymetry.depth_m)
-    predicted = int((known & (count == 0)).sum())
+    predicted = int((known & ~bathymetry.sounded).sum())
     if not predicted:
         return "Every cell with an elevation was sounded."
-    return f"In {predicted} of {int(known.sum())} cells with an elevation num_soundings is 0: there it is predicted."
+    return f"{predicted} of {int(known.sum())} cells with an elevation hold no sounding: there it is predicted."

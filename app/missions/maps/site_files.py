@@ -10,6 +10,7 @@ import numpy as np
 
 from app.mapping.coordinates.projected import Frame
 from app.mapping.layers import Fit
+from app.mapping.products.bag import bag
 from app.mapping.products.contours import (
     Contour,
     contours_geojson,
@@ -71,6 +72,19 @@ def _map_xyz(site: SiteMap, frame: Frame) -> bytes:
     bathymetry, _ = placed(_known(site), (), frame)
     # What a survey's soundings share is in the deviations of a site already.
     return map_xyz(bathymetry, frame, vertical_datum=site.datum.statement, common_sd_m=0.0)
+
+
+def _map_bag(site: SiteMap, frame: Frame) -> bytes:
+    bathymetry, _ = placed(_known(site), (), frame)
+    # What a survey's soundings share is in the deviations of a site already, and it counts surveys, not soundings.
+    return bag(
+        bathymetry,
+        frame,
+        vertical_datum=site.datum,
+        title=_title(site),
+        common_sd_m=0.0,
+        counts_soundings=False,
+    )
 
 
 def _contours(site: SiteMap) -> list[Contour]:
@@ -180,6 +194,9 @@ class ChangeFile:
 MAP_FILES: dict[str, MapFile] = {
     "tif": MapFile(
         "image/tiff", "GeoTIFF with depth, deviation, age and survey of each cell", _map_tif, projected=True
+    ),
+    "bag": MapFile(
+        "application/x-bag", "BAG with elevation and deviation, for hydrographic offices", _map_bag, projected=True
     ),
     "png": MapFile("image/png", "the site's map as a picture", _map_png),
     "xyz": MapFile(TEXT, "text: position, depth, deviation, surveys, sounded", _map_xyz, projected=True),

@@ -180,8 +180,26 @@ async def test_files_hold_what_the_answers_say(client: httpx.AsyncClient) -> Non
     found = await get(client, f"/sites/{site}/changes")
     largest = max(abs(found["least_m"]), abs(found["largest_m"]))
     assert 0.8 * largest <= found["last_colour_m"] <= largest
-    missing = await client.get(f"/sites/{site}/map.bag")
+    missing = await client.get(f"/sites/{site}/map.shp")
     assert (missing.status_code, missing.json()["type"]) == (404, "urn:bathyfleet:problem:format-not-found")
+
+
+@pytest.mark.parametrize("crs", [None, "utm"])
+async def test_a_site_is_had_as_a_bag(client: httpx.AsyncClient, crs: str | None) -> None:
+    site = await new_site(client)
+    await surveyed(client, site, START_S)
+    known = await get(client, f"/sites/{site}/map")
+    answer = await client.get(f"/sites/{site}/map.bag", params={} if crs is None else {"crs": crs})
+    assert answer.status_code == 200, answer.text
+    with rasterio.MemoryFile(answer.content, ext=".bag") as memory, memory.open() as file:
+        assert file.driver == "BAG"
+        elevation, sd = (np.where(file.read(i) == file.nodata, np.nan, file.read(i))[::-1] for i in (1, 2))
+        assert file.count == 2, "no numbers of soundings: a site counts surveys"
+    assert np.nanmin(-elevation) >= known["min_depth_m"] - 0.01
+    assert np.nanmax(-elevation) <= known["max_depth_m"] + 0.01
+    if crs is None:
+        np.testing.assert_allclose(-elevation, array(known["depth_m"]), atol=2e-3)
+        np.testing.assert_allclose(sd, array(known["sd_m"]), atol=2e-3)
 
 
 async def test_contours_of_a_site_are_at_its_depths(client: httpx.AsyncClient, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import { Picture } from "./Picture";
 import { SiteForm } from "./SiteForm";
 
 /** Files of a site's map; those in metres can be had in UTM as well. */
-const MAP_FILES = ["tif", "xyz", "geojson", "kml", "dxf", "png"] as const;
+const MAP_FILES = ["tif", "bag", "xyz", "geojson", "kml", "dxf", "png"] as const;
 const IN_METRES: readonly string[] = ["tif", "xyz", "dxf"];
 
 /** What is known of one site. */
