@@ -1,8 +1,10 @@
 """Beams of swath sonars, and what operators say of them."""
 
+import asyncio
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request
+import orjson
+from fastapi import APIRouter, Path, Request, Response
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
@@ -10,6 +12,7 @@ from app.api.http.problems import body_problems, problems
 from app.api.http.while_connected import while_connected
 from app.api.mission import Mission
 from app.api.schemas import API
+from app.missions.live.mission import LiveMission
 from app.missions.operations.corrections import beam_editing
 from app.missions.views.measurements.beams import (
     BeamEditsView,
@@ -44,7 +47,14 @@ async def select_beams(reader: Reader, mission: Mission, request: Request, body:
 
     Nothing stated: all. With more beams than `limit` those of every second ping come, or fourth, and so on.
     """
-    return await while_connected(request, beam_editing.beam_points(mission, body, body.limit))
+    return await while_connected(request, _points(mission, body))
+
+
+async def _points(mission: LiveMission, body: BeamPointsRequest) -> Response:
+    found = await beam_editing.beam_points(mission, body, body.limit)
+    # A million numbers would hold everybody up while they are looked at one by one.
+    content = await asyncio.to_thread(orjson.dumps, dict(found))
+    return Response(content, media_type="application/json")
 
 
 @router.post(
