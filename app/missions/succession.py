@@ -13,7 +13,7 @@ import structlog
 
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.missions.errors import ConflictError, InvalidRequestError, MissionError, MissionNotFoundError
-from app.missions.flight.own_legs import NOT_WAITED_FOR
+from app.missions.flight.survey_end import NOT_WAITED_FOR
 from app.missions.live.mission import LiveMission
 from app.missions.preflight.survey import preflight
 from app.missions.spec.mission import MissionSpec

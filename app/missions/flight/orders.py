@@ -42,12 +42,12 @@ THERE_M = 1.0
 
 INSIDE_M = 1e-3
 
-Find = Callable[[Member, "Flight"], Awaitable[FloatArray]]
+Find = Callable[[Member, "OrderedFlight"], Awaitable[FloatArray]]
 """Returns the corners (k, 2) of an order's way for a vehicle; raises what speaks against it."""
 
 
 @dataclass(frozen=True)
-class Flight:
+class OrderedFlight:
     """What carries orders out, and what they are checked by."""
 
     planner: OrderedPlanner
@@ -64,7 +64,7 @@ class OrderBook:
     def __init__(self, live: LiveMission) -> None:
         self._live = live
         self._taking = asyncio.Lock()
-        self._flight: Flight | None = None
+        self._flight: OrderedFlight | None = None
         self._skipped_at: dict[str, int] = {}
         """Number of a vehicle's last leg when it was to leave out its line."""
 
@@ -119,7 +119,7 @@ class OrderBook:
         live.publish_summary()
         return order_view(row)
 
-    def able(self, name: str) -> tuple[Member, Flight]:
+    def able(self, name: str) -> tuple[Member, OrderedFlight]:
         """Return a vehicle that can take orders, and its flight. Raises VehicleNotFoundError, ConflictError."""
         live = self._live
         member = live.team.named(name)
@@ -139,7 +139,7 @@ class OrderBook:
             raise ConflictError(f"vehicle {name!r} cannot be reached now", "wait until it is heard, or abort it")
         return member, self._flight
 
-    async def _check(self, member: Member, flight: Flight, kind: OrderKind, corners: FloatArray) -> None:
+    async def _check(self, member: Member, flight: OrderedFlight, kind: OrderKind, corners: FloatArray) -> None:
         """Raise ConflictError where an order's way cannot be flown by what is known now."""
         live, spec, name = self._live, self._live.spec, member.name
         start = self.start_m(member, kind)
@@ -212,7 +212,7 @@ class OrderBook:
 
     # Carrying them out
 
-    async def begin(self, flight: Flight) -> None:
+    async def begin(self, flight: OrderedFlight) -> None:
         """Take up the orders that are stored, for a flight whose planner has its memory."""
         live, planner = self._live, flight.planner
         async with live.database.reading() as session:
@@ -294,7 +294,7 @@ class OrderBook:
                 await self._see(member, order, planner)
         return taken
 
-    async def _take(self, member: Member, order: OperatorOrder, flight: Flight) -> None:
+    async def _take(self, member: Member, order: OperatorOrder, flight: OrderedFlight) -> None:
         """Give up the legs that a vehicle has and lead it where it was ordered; nothing is decided before this ends."""
         planner, name, here_m = flight.planner, member.name, member.place_m(self._live.frame)
         if order.kind is OrderKind.SKIP_LINE:

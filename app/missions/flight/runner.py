@@ -36,7 +36,7 @@ from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
 from app.missions.flight.observation.vehicle_clocks import VehicleClocks
 from app.missions.flight.observation.waiting import Waiting
-from app.missions.flight.orders import Flight, OrderBook
+from app.missions.flight.orders import OrderBook, OrderedFlight
 from app.missions.flight.own_legs import OwnLegs
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.flight.team_steps import TeamSteps
@@ -52,8 +52,6 @@ from app.missions.team import SETTLED, Member, WithdrawalCause
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.queries import missions as mission_queries
-
-"""After how long a part of the flight that failed begins anew, on the wall clock."""
 
 log = structlog.get_logger(__name__)
 
@@ -106,7 +104,7 @@ class Runner:
         self._giving_way = GivingWay(live, moment, room, asides, others, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
-        self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)
+        self._ordered = OrderedFlight(planner, constraints, self._range, self._dispatch, self._apart)
         self._withdrawals = Withdrawals(live, hub, self._leg_commit, self._dispatch, self._range, time_scale)
 
     async def run(self) -> str:

@@ -18,7 +18,7 @@ from app.estimation.swath import SwathSonar
 from app.estimation.uncertainty import BeamGeometry, Uncertainty, uncertainty
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.decision import Knowledge, decide
-from app.missions.flight.own_legs import LEAD_S, SOON
+from app.missions.flight.legs.demand import LEAD_S, SOON
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder

@@ -19,9 +19,10 @@ from app.missions.flight import runner
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import NO_LEG, LegCommit
+from app.missions.flight.legs.demand import MOST_AHEAD, LegDemand
 from app.missions.flight.legs.exchange import LegExchange
-from app.missions.flight.own_legs import MOST_AHEAD, NOT_WAITED_FOR, OwnLegs
 from app.missions.flight.runner import nearest_leg
+from app.missions.flight.survey_end import NOT_WAITED_FOR
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
 from app.missions.safety import free_space
@@ -224,7 +225,7 @@ async def test_who_comes_back_flies_as_many_legs_as_the_others_have_left_not_as_
     service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Decisions that take long give vehicles many legs at once, here all of them."""
-    monkeypatch.setattr(OwnLegs, "_legs_at_once", lambda *_: MOST_AHEAD)
+    monkeypatch.setattr(LegDemand, "legs_at_once", lambda *_: MOST_AHEAD)
     mission = (await service.create(sim_spec(steps=15, side_m=60.0, **APART))).id
     live = await service.get(mission)
     await act(service, mission, "start")
@@ -263,7 +264,7 @@ async def test_vehicles_that_fall_silent_while_legs_are_exchanged_are_waited_for
             member.engaged = True
 
     monkeypatch.setattr(LegExchange, "look", long_look)
-    monkeypatch.setattr(OwnLegs, "_lasts_s", lambda *_: 1e6)  # nobody is in a hurry, however slow the machine is
+    monkeypatch.setattr(LegDemand, "_lasts_s", lambda *_: 1e6)  # nobody is in a hurry, however slow the machine is
     service = await harbour_closed.open(time_scale=5.0)
     mission = (await service.create(sim_spec(steps=9, side_m=60.0, **APART))).id
     live = await service.get(mission)

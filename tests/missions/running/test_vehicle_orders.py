@@ -12,7 +12,9 @@ from app.missions.errors import ConflictError, InvalidRequestError, VehicleNotFo
 from app.missions.flight import own_legs
 from app.missions.flight.decisions.decision import Decision
 from app.missions.flight.decisions.separation import too_close
+from app.missions.flight.legs import spacing
 from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.demand import LegDemand
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
@@ -138,9 +140,9 @@ async def test_an_order_whose_legs_wait_for_another_vehicle_is_carried_out(
             assert step is not None
             stored.append(step.memory == legs._decider.planner.snapshot())
 
-    monkeypatch.setattr(own_legs, "too_close", close)
+    monkeypatch.setattr(spacing, "too_close", close)
     monkeypatch.setattr(own_legs.OwnLegs, "_decide", decide_and_look)
-    monkeypatch.setattr(own_legs.OwnLegs, "_legs_at_once", lambda *_: 12)
+    monkeypatch.setattr(LegDemand, "legs_at_once", lambda *_: 12)
     order = await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(70.0, 70.0)), "Ana")
     await until_over(live, order.id)
     assert barred > 0

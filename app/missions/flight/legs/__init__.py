@@ -1,1 +1,4 @@
-"""Legs from decision to arrival: committed, sent, exchanged for better ones; who has range for them, who is late."""
+"""Legs from decision to arrival: who needs them, what keeps them apart, committed, sent, exchanged for better ones.
+
+Also who has energy for them, who is late, and which are taken back where a mission's length changes.
+"""
