@@ -57,7 +57,7 @@ def leads_on(member: "Member") -> bool:
     """Whether a vehicle has a leg that leads anywhere."""
     if not member.ordered or member.target_m is None:
         return False
-    return member.leg_start_m is None or math.dist(member.leg_start_m, member.target_m) > NOWHERE_M
+    return member.leg.start_m is None or math.dist(member.leg.start_m, member.target_m) > NOWHERE_M
 
 
 class Watch:

@@ -133,6 +133,69 @@ class Withdrawal:
         return cls(response, stored["why"], stored["over"], asked=stored["asked"], cause=cause, told=True)
 
 
+@dataclass(frozen=True, slots=True)
+class WayHome:
+    """A vehicle's way home from about where it is.
+
+    Attributes
+    ----------
+    corners_m : (n, 2)
+        None: it has none, or it is not known yet.
+    needs_s
+        How long it takes; None as for the corners.
+    drift_reserve_s
+        What the vehicle's reserve has for a drift while nobody hears it.
+    left_alone_m : (n, 2)
+        Its corners from anywhere on the vehicle's leg, for one that gets no further order.
+    turn_back_m : (2,)
+        Where on its planned legs it has to turn back at the latest; None: on none of them, or not known.
+    """
+
+    corners_m: NDArray[np.float64] | None = None
+    needs_s: float | None = None
+    drift_reserve_s: float = 0.0
+    left_alone_m: NDArray[np.float64] | None = None
+    turn_back_m: NDArray[np.float64] | None = None
+
+
+@dataclass
+class FixTimes:
+    """Fixes of a vehicle at the surface, times by its clock.
+
+    Attributes
+    ----------
+    submerged_s
+        How long it has been under water since its last one.
+    surfaced_s
+        How long it has been at the surface now.
+    risings
+        How often it was sent up for one.
+    """
+
+    submerged_s: float = 0.0
+    surfaced_s: float = 0.0
+    risings: int = 0
+
+
+@dataclass
+class OrderedLeg:
+    """The leg that a vehicle was ordered to fly.
+
+    Attributes
+    ----------
+    start_m : (2,)
+        Where it begins.
+    began_s
+        When it was ordered, the event loop's time.
+    allowed_s
+        How long it may take, by the vehicles' clock.
+    """
+
+    start_m: NDArray[np.float64] | None = None
+    began_s: float = 0.0
+    allowed_s: float = 0.0
+
+
 @dataclass
 class Member:
     """A vehicle that takes part. ``slot`` is its place in the depth stack."""
@@ -166,12 +229,8 @@ class Member:
     """Its last reported position, and where that is in a frame: asked for again and again."""
     surfacing: bool = False
     """Whether its waypoint brings it up for a fix."""
-    submerged_s: float = 0.0
-    """How long it has been under water since its last fix at the surface, by its clock."""
-    surfaced_s: float = 0.0
-    """How long it has been at the surface now, by its clock."""
-    risings: int = 0
-    """How often it was sent up for one."""
+    fixes: FixTimes = field(default_factory=FixTimes)
+    """When it had fixes at the surface, and how often it was sent up for one."""
     pursuing: str | None = None
     """The target for which it left the mapping."""
     ahead: list[CommittedLeg] = field(default_factory=list)
@@ -189,28 +248,16 @@ class Member:
     withdrawal: Withdrawal | None = None
     """Why it does not survey; None while it does."""
     energy: Energy = field(default_factory=lambda: Energy(1.0))
-    return_needs_s: float | None = None
-    """How long its way home takes from where it is; None: it has none, or it is not known yet."""
-    drift_reserve_s: float = 0.0
-    """What its reserve has for a drift while nobody hears it."""
-    way_home_m: NDArray[np.float64] | None = None
-    """The corners of its way home from about where it is, (n, 2); None: it has none, or it is not known yet."""
-    way_left_alone_m: NDArray[np.float64] | None = None
-    """The same from anywhere on its leg, for a vehicle that gets no further order."""
-    turn_back_m: NDArray[np.float64] | None = None
-    """Where on its planned legs it has to turn back at the latest, (2,); None: on none of them, or not known."""
+    way_home: WayHome = field(default_factory=WayHome)
+    """Its way home from about where it is, as that was looked at last."""
     failsafes: list[Active] = field(default_factory=list)
     """What is in force for it, the strongest response first."""
     asked: OperatorOrder | None = None
     """What its operator ordered; None: it does its part."""
     waits_m: NDArray[np.float64] | None = None
     """Centre of the circle in which it was sent to wait, (2,); None: it was not, or has an order since."""
-    leg_start_m: NDArray[np.float64] | None = None
-    """Where the leg of its order begins, (2,)."""
-    leg_began_s: float = 0.0
-    """When it was given its order, the event loop's time."""
-    leg_allowed_s: float = 0.0
-    """How long it may take for it, by the vehicles' clock."""
+    leg: OrderedLeg = field(default_factory=OrderedLeg)
+    """The leg of its order: where it begins, and its time."""
     lets_pass: bool = False
     """Whether it was led aside from its leg to let another vehicle pass, and the time for its leg stands still."""
     asides: int = 0
@@ -346,7 +393,7 @@ class Team:
         before = self.departed.pop(spec.name, None)
         member = Member(spec, slot, self.capabilities_of(spec.kind), energy=self.energy_of(spec))
         if before is not None and before.key == member.key:
-            member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
+            member.report, member.heard_s, member.fixes.risings = before.report, before.heard_s, before.fixes.risings
             member.clock_ahead_s = before.clock_ahead_s
             member.stored_battery_pct = before.stored_battery_pct
             member.legs, member.committed_m, member.spared = before.legs, before.committed_m, before.spared

@@ -109,7 +109,7 @@ def test_circling_is_no_survey() -> None:
     order = WaypointOrder("m1", 1, "a", Position(41.0, -8.0, 2.0), 1.3, 3.0, 2.0)
     for start_m, leads in (((0.0, 0.0), True), ((20.0, 0.0), False)):
         member.set_order(order, np.array([20.0, 0.0]))
-        member.status, member.leg_start_m = WaypointStatus.SENT, np.array(start_m)
+        member.status, member.leg.start_m = WaypointStatus.SENT, np.array(start_m)
         assert leads_on(member) is leads
 
 

@@ -189,8 +189,8 @@ class OrderBook:
             here_m = member.place_m(self._live.frame)
             # It may have swung out of the area, where nobody can be ordered.
             places[-1] = here_m if flight is None else FreeSpace(flight.constraints, 0.0).nearest(here_m)
-        if len(ends) == 1 and member.leg_start_m is not None:
-            places = np.vstack([member.leg_start_m, places])
+        if len(ends) == 1 and member.leg.start_m is not None:
+            places = np.vstack([member.leg.start_m, places])
         return flown_lines(places)
 
     async def cancel(self, member: Member, actor: str) -> bool:

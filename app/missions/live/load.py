@@ -104,7 +104,7 @@ async def take_up(
         member.report = _last_report(positions.get(member.name), level_pct if ended else None)
         member.heard_s = heard.get(member.name)
         member.stored_battery_pct = level_pct
-        member.risings = risings.get(member.name, 0)
+        member.fixes.risings = risings.get(member.name, 0)
         member.flown = Flown.recall(vehicle.flown)
         member.energy.used_s = member.flown.used_s
         member.withdrawal = Withdrawal.recall(vehicle.withdrawal)

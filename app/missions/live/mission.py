@@ -1,7 +1,6 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
-import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -26,7 +25,7 @@ from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
 from app.missions.live.journals.range_journal import RangeJournal
 from app.missions.live.journals.swath_intake import SwathIntake
-from app.missions.live.remaining import remaining, within_window
+from app.missions.live.progress import figures, progress, search_progress, summary
 from app.missions.live.ships import ShipsAbout
 from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.threads import Threads
@@ -45,7 +44,6 @@ from app.missions.pings.store import PingStore
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import STRENGTH
 from app.missions.search.mates import Mates
-from app.missions.search.progress import progress_of
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
 from app.missions.soundings.beam_edits import BeamEdit, rulings_of
@@ -57,13 +55,12 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.vehicle import Sensor as SensorName
 from app.missions.spec.vehicle import VehicleSpec
-from app.missions.states import ENDED, NOT_STARTED, MissionState
+from app.missions.states import ENDED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
 from app.missions.team import Member, Swath, Team, Withdrawal, WithdrawalCause
 from app.missions.views.messages import StateMessage
 from app.missions.views.mission import MissionSummary, Progress
-from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
 from app.storage.concurrency.single_flight import Shared
 from app.storage.database import Database
@@ -169,9 +166,11 @@ class LiveMission:
         """Whether what vehicles fly is counted: while the flight goes on, until that is stored at its end."""
         self.database = database
         """What is written through it is refused once another process has the mission."""
-        self.waypoints = WaypointViews(spec, self.team, self.broadcaster)
+        self.waypoints = WaypointViews(lambda: self.spec, self.team, self.broadcaster)
         self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
-        self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach, time_scale)
+        self.vehicles = VehicleViews(
+            row.id, lambda: self.spec, self.frame, hub, self.team, self.boundaries.breach, time_scale
+        )
         targets = self.target_views if spec.targets else None
         self.reports = VehicleReports(
             row.id,
@@ -188,8 +187,10 @@ class LiveMission:
         self._measured_late: Callable[[], None] = _nothing
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
         """Ships near the mission."""
-        self.feed = LiveFeed(self.broadcaster, self.vehicles.message, targets, self.search_progress, self.ships.message)
-        self._time_scale = time_scale
+        self.feed = LiveFeed(
+            self.broadcaster, self.vehicles.message, targets, partial(search_progress, self), self.ships.message
+        )
+        self.time_scale = time_scale
         self._threads = threads
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
         self.notice_imports = Shared(self._notice_imports)
@@ -346,7 +347,7 @@ class LiveMission:
 
     def relength(self, budget: Budget, left_m: Mapping[str, float]) -> None:
         """Be of another length from now on; ``left_m``: by vehicle what it may fly yet, metres, as it is stored."""
-        self.spec = self.vehicles.spec = self.spec.with_budget(budget)
+        self.spec = self.spec.with_budget(budget)
         for member in self.team:
             if member.name in left_m:
                 member.flown.left_m = left_m[member.name]
@@ -531,108 +532,15 @@ class LiveMission:
 
     def figures(self) -> dict[str, float]:
         """Return how far the mission has come, as each step keeps it."""
-        built = self.builder.newest
-        found = {
-            "coverage_pct": self.builder.coverage_pct(),
-            "remaining_pct": self.builder.remaining_pct(),
-            "distance_m": self.journal.travelled_m,
-        }
-        return found | ({} if built is None else {"mean_sd_m": built.mean_sd_m})
+        return figures(self)
 
     def progress(self) -> Progress:
         """Return how far the mission has come."""
-        built = self.builder.newest
-        header, counts = self.header, self.journal.counts
-        loop_time = asyncio.get_running_loop().time()
-        running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
-        search = self.search_progress()
-        left = remaining(self.spec, self.team) if search is None else within_window(search)
-        swept = self.builder.ensonified()
-        return Progress(
-            step=header.step,
-            steps=max(self.spec.steps, header.step),
-            budget=self.spec.budget,
-            minutes_left=left.minutes,
-            km_left_per_vehicle=left.km_per_vehicle,
-            soundings=counts.accepted,
-            rejected=counts.rejected + counts.rejected_pings,
-            pings=counts.pings,
-            beams=counts.beams,
-            ensonified_pct=None if swept is None else swept.ensonified_pct,
-            dense_pct=None if swept is None else swept.dense_pct,
-            holidays=None if swept is None else len(swept.holidays),
-            distance_m=self.journal.travelled_m,
-            coverage_pct=self.builder.coverage_pct(),
-            remaining_pct=self.builder.remaining_pct(),
-            mean_sd_m=built.mean_sd_m if built is not None else None,
-            objective=header.objective,
-            terms=header.terms or {},
-            elapsed_s=header.elapsed_s + running_s,
-            eta_s=self._eta_s(),
-            search=search,
-        )
-
-    def search_progress(self) -> SearchProgress | None:
-        """Return how a search stands; None in a survey."""
-        ended_at = self.header.updated_at if self.header.state in ENDED else None
-        return progress_of(self.search, self.team, self.frame, ended_at)
-
-    def _eta_s(self) -> float | None:
-        """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts.
-
-        A survey for a time or a distance takes what is left of that, as its vehicles fly; of steps, what steps took.
-        One that ends when its lines are flown takes no longer than these.
-        """
-        if self.header.state in ENDED:
-            return 0.0
-        if self.search is not None:
-            return max(self.search.left_s(), 0.0) / self._time_scale
-        if list(self.team) and not self.team.going_on:
-            # What they still fly is their way home.
-            return None if self.awaits_batteries else 0.0
-        left = remaining(self.spec, self.team)
-        if left.minutes is not None and self.header.state not in NOT_STARTED:
-            return min(60.0 * left.minutes, self._lines_left_s()) / self._time_scale
-        if self.reports.leg_s is None:
-            return None
-        committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
-        leg_m, flying = self.spec.limits.max_step_m, [*self.team.plannable, *self.team.held]
-        legs = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
-        return (max(0.0, *legs) + max(committed, default=0)) * self.reports.leg_s
-
-    def _lines_left_s(self) -> float:
-        """Return how long the team flies lines that were asked for, of its time; infinite without such."""
-        left_m = (self.header.terms or {}).get("left_m")
-        going_on = self.team.going_on
-        if left_m is None or not going_on or not self.spec.lines_asked_for:
-            return math.inf
-        ahead_m = np.array([member.way_ahead_m(self.frame) for member in going_on])
-        speeds_mps = np.array([self.spec.speed_of(member.spec) for member in going_on])
-        # What nobody has been given yet is dealt so that all are done at the same time.
-        return float(max((left_m + ahead_m.sum()) / speeds_mps.sum(), (ahead_m / speeds_mps).max()))
+        return progress(self)
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""
-        header = self.header
-        return MissionSummary(
-            id=self.id,
-            name=self.spec.name,
-            state=header.state,
-            reason=self._why_it_waits() or header.reason,
-            created_at=header.created_at,
-            updated_at=header.updated_at,
-            ending=None if self.ending is None or header.state in ENDED else self.ending.state,
-            after=self.spec.after,
-            progress=self.progress(),
-        )
-
-    def _why_it_waits(self) -> str:
-        trouble = self.journal.storage.trouble
-        if not trouble:
-            stands = self.standstill and self.header.state is MissionState.RUNNING
-            return f"no vehicle can be sent anywhere: {self.standstill}" if stands else ""
-        waits = "; the vehicles wait at their waypoints" if self.header.state is MissionState.RUNNING else ""
-        return f"nothing can be written down: {trouble}{waits}"
+        return summary(self)
 
     def publish_summary(self) -> None:
         """Tell everyone who watches about state and progress."""

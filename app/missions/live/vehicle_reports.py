@@ -170,8 +170,8 @@ class VehicleReports:
         if passed_s > LONGEST_GAP_S or not is_flown(math.dist(before, place), passed_s):
             return
         leg = None
-        if member.ordered and member.leg_start_m is not None and member.target_m is not None:
-            leg = place_of(member.leg_start_m), place_of(member.target_m)
+        if member.ordered and member.leg.start_m is not None and member.target_m is not None:
+            leg = place_of(member.leg.start_m), place_of(member.target_m)
         flown.add_way(before, place, leg)
         waits = not member.ordered and member.legs and way_left_m > 0.0 and member.withdrawal is None
         if waits and heard_before:
@@ -234,7 +234,7 @@ class VehicleReports:
             member.misses = 0
             if member.flies_survey:
                 member.flown.reach_leg()
-            took_s = asyncio.get_running_loop().time() - member.leg_began_s
+            took_s = asyncio.get_running_loop().time() - member.leg.began_s
             before_s = took_s if self.leg_s is None else self.leg_s
             self.leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
         elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
@@ -248,12 +248,12 @@ class VehicleReports:
 def _count_submersion(member: Member, depth_m: float, passed_s: float, policy: SurfacePolicy | None) -> None:
     """Count how long a vehicle has been under water, or up again; what counts as a fix the policy says."""
     if depth_m > SURFACE_M:
-        member.surfaced_s = 0.0
-        member.submerged_s += passed_s
+        member.fixes.surfaced_s = 0.0
+        member.fixes.submerged_s += passed_s
         return
-    member.surfaced_s += passed_s
-    if policy is None or member.surfaced_s >= policy.stay_s:
-        member.submerged_s = 0.0
+    member.fixes.surfaced_s += passed_s
+    if policy is None or member.fixes.surfaced_s >= policy.stay_s:
+        member.fixes.submerged_s = 0.0
 
 
 def phase_of(withdrawal: Withdrawal) -> Phase:

@@ -66,7 +66,7 @@ async def waypoint(
     if found is not None and link is not None:
         link.has_waypoint(vehicle, found.step)
         found = live.waypoints.of(vehicle)
-    way_m = member.way_left_alone_m
+    way_m = member.way_home.left_alone_m
     if found is None or way_m is None:
         return found
     lats, lons = live.frame.to_geographic(way_m[:, 0], way_m[:, 1])

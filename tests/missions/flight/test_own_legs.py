@@ -413,8 +413,8 @@ async def test_after_a_restart_the_rest_of_a_line_is_flown(harbour_closed: Harbo
         if not (member.ordered and len(member.ahead) >= 2 and member.legs - len(member.ahead) >= 2):
             return False
         assert member.target_m is not None
-        assert member.leg_start_m is not None
-        long_m = np.hypot(*(member.target_m - member.leg_start_m))
+        assert member.leg.start_m is not None
+        long_m = np.hypot(*(member.target_m - member.leg.start_m))
         left_m = np.hypot(*(member.target_m - member.place_m(live.frame)))
         return bool(long_m > 50.0 and 0.3 * long_m < left_m < 0.7 * long_m)
 

@@ -59,8 +59,8 @@ async def test_who_is_held_stays_where_it_is_and_searches_on(service: MissionSer
     await until(lambda: boat.waits_m is not None, "it is told where to wait")
     assert boat.waits_m is not None
     assert boat.target_m is not None
-    assert boat.leg_start_m is not None
-    assert LineString([boat.leg_start_m, boat.target_m]).distance(Point(boat.waits_m)) < 1.5
+    assert boat.leg.start_m is not None
+    assert LineString([boat.leg.start_m, boat.target_m]).distance(Point(boat.waits_m)) < 1.5
     assert (await view_of(service, live.id)).state is MissionState.RUNNING
     await service.send_on(live, "boat", "Ana")
     done = await until_state(service, live.id, MissionState.FINISHED)

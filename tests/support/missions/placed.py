@@ -83,7 +83,7 @@ class PlacedVehicles:
         if order is None or anew:
             order = WaypointOrder(self.live.id, 1, name, self._position(to), 1.0, 3.0, 1.0)
             member.set_order(order, np.array(to[:2]))
-            member.leg_began_s = asyncio.get_running_loop().time()
+            member.leg.began_s = asyncio.get_running_loop().time()
         member.status = Status.ACKNOWLEDGED
         return member
 

@@ -153,7 +153,7 @@ def place_of(member: Member, live: LiveMission) -> Place:
         report.position_sd_m if report is not None and report.position_sd_m is not None else math.nan,
         report.position.depth_m if member.surfacing and report is not None else math.nan,
         member.capabilities.keeps_depth,
-        submerged_s=member.submerged_s,
+        submerged_s=member.fixes.submerged_s,
         altitude_m=member.altitude_m,
         turn_radius_m=turn_radius_m(live.spec, member.spec),
     )

@@ -103,7 +103,7 @@ class Asides:
             return
         del self._led[member.name]
         if aside.because is not Because.VEHICLE or member.lets_pass:
-            member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
+            member.leg.began_s += asyncio.get_running_loop().time() - aside.since_s
         member.waits_m, member.lets_pass = None, False
         await self._dispatch.send(member)
         self._live.changed.set()  # its time for the leg goes on

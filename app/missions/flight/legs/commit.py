@@ -173,10 +173,10 @@ class LegCommit:
         """Make a vehicle's next leg its order."""
         leg = member.ahead.pop(0)
         if member.target_m is not None and member.status is WaypointStatus.REACHED and member.waits_m is None:
-            member.leg_start_m = member.target_m
+            member.leg.start_m = member.target_m
         elif member.report is not None:
-            member.leg_start_m = member.place_m(self._live.frame)
-        member.risings += leg.surfacing and not member.surfacing
+            member.leg.start_m = member.place_m(self._live.frame)
+        member.fixes.risings += leg.surfacing and not member.surfacing
         member.surfacing = leg.surfacing
         self._order(leg, member)
         self._live.waypoints.show(leg.number, member.name, leg.position, leg.target_m)

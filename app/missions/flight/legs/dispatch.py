@@ -65,9 +65,9 @@ class Dispatch:
             now_s = loop.time()
             for member in self._live.team:
                 if member.ordered and not member.busy:
-                    member.leg_began_s = now_s  # it is out of reach
+                    member.leg.began_s = now_s  # it is out of reach
                 elif member.left_alone:
-                    member.leg_began_s += now_s - looked_s
+                    member.leg.began_s += now_s - looked_s
             looked_s = now_s
             under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy and not m.left_alone}
             late = await self.settle_late()
@@ -88,7 +88,7 @@ class Dispatch:
         flying = [member for member in asked if member.busy and not member.left_alone]
         late = [member for member in flying if late_at_s(member, self._time_scale) <= now_s]
         # All at once: while a line of the log is written, others may be sent on to their next legs.
-        numbers = [self._settle_missed(member, missed(member.leg_allowed_s)) for member in late]
+        numbers = [self._settle_missed(member, missed(member.leg.allowed_s)) for member in late]
         for member, number in zip(late, numbers, strict=True):
             message = f"{member.name} did not get to the end of its leg {number}: it goes on with the next"
             await tell_of(self._live, [member], message, number)
@@ -153,8 +153,8 @@ class Dispatch:
                 await self.drop_ahead(member, f"from where it is {barred}")
                 continue
             self._leg_commit.begin_next(member)
-            member.leg_began_s = asyncio.get_running_loop().time()
-            member.leg_allowed_s = leg_allowed_s(self._live, member)
+            member.leg.began_s = asyncio.get_running_loop().time()
+            member.leg.allowed_s = leg_allowed_s(self._live, member)
             self._refusals.pop(member.name, None)
             if member.engaged:
                 beginning.append(self.send(member))

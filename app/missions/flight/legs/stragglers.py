@@ -36,7 +36,7 @@ def leg_allowed_s(live: LiveMission, member: Member) -> float:
 
 def step_allowed_s(live: LiveMission) -> float:
     """Return how long a team's step may take, by the vehicles' clocks: as long as the longest leg of it may."""
-    under_way = [member.leg_allowed_s for member in live.team if member.ordered and member.report is not None]
+    under_way = [member.leg.allowed_s for member in live.team if member.ordered and member.report is not None]
     return max([live.spec.step_deadline_s, *under_way])
 
 
@@ -47,7 +47,7 @@ def late_at_s(member: Member, time_scale: float) -> float:
     """
     if member.lets_pass:
         return math.inf
-    return member.leg_began_s + member.leg_allowed_s / time_scale
+    return member.leg.began_s + member.leg.allowed_s / time_scale
 
 
 def missed(allowed_s: float) -> str:

@@ -32,7 +32,7 @@ from app.missions.recovery.failsafes import (
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.recovery import Homecoming
-from app.missions.team import OUT_OF_REACH, Member
+from app.missions.team import OUT_OF_REACH, Member, WayHome
 from app.missions.views.mission import Level
 
 HEARD_S = 3.0
@@ -111,11 +111,13 @@ class FailsafeWatch:
 
     def _look_at(self, member: Member, now_s: float, too_close: dict[Failsafe, str]) -> None:
         """Tell what a vehicle's way home takes, and do what its failsafes ask for."""
-        member.way_home_m = self._range.way(member)
-        member.way_left_alone_m = self._range.way_left_alone(member)
-        member.return_needs_s = self._range.needs_s(member)
-        member.drift_reserve_s = self._range.drift_reserve_s(member)
-        member.turn_back_m = self._range.turn_back(member)
+        member.way_home = WayHome(
+            corners_m=self._range.way(member),
+            left_alone_m=self._range.way_left_alone(member),
+            needs_s=self._range.needs_s(member),
+            drift_reserve_s=self._range.drift_reserve_s(member),
+            turn_back_m=self._range.turn_back(member),
+        )
         over = member.withdrawal is not None and member.withdrawal.over
         detected = {} if over else self._detected(member) | too_close
         # Who waits at the surface to be taken out of the water is in ships' way, too.
@@ -215,7 +217,7 @@ class FailsafeWatch:
         return found
 
     def _energy(self, member: Member) -> dict[Failsafe, str]:
-        left, needs_s = member.energy.left, member.return_needs_s
+        left, needs_s = member.energy.left, member.way_home.needs_s
         if needs_s is None:
             level = member.energy.level_pct
             if level is None or level >= LOW_PCT:
@@ -231,7 +233,7 @@ class FailsafeWatch:
                 if math.isfinite(needs_s)
                 else "the current is too strong for its way home"
             )
-        if left.safe_s <= with_reserve_s(needs_s, member.drift_reserve_s):
+        if left.safe_s <= with_reserve_s(needs_s, member.way_home.drift_reserve_s):
             found[Failsafe.LOW_ENERGY] = (
                 f"its energy lasts {left.safe_s:.0f} s for sure, and its way home takes {needs_s:.0f} s"
             )

@@ -45,12 +45,12 @@ class OnboardWays:
     async def drop(self) -> None:
         """Take all ways away again, where the mission has ended and its vehicles can be reached."""
         # An earlier run of the service may have stored some.
-        able = [m for m in self._live.team if m.capabilities.keeps_way_home and m.way_home_m is not None]
+        able = [m for m in self._live.team if m.capabilities.keeps_way_home and m.way_home.corners_m is not None]
         self._kept.clear()
         await asyncio.gather(*(self._drop(member) for member in able))
 
     async def _renew(self, member: Member) -> None:
-        way_m = member.way_left_alone_m
+        way_m = member.way_home.left_alone_m
         if member.withdrawal is not None and member.withdrawal.over and self._kept.pop(member.name, None) is not None:
             await self._drop(member)
         if way_m is None or (member.withdrawal is not None and member.withdrawal.over):

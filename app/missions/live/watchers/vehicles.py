@@ -39,7 +39,7 @@ class VehicleViews:
     def __init__(
         self,
         mission_id: str,
-        spec: MissionSpec,
+        spec: Callable[[], MissionSpec],
         frame: LocalFrame,
         hub: FleetHub,
         team: Team,
@@ -48,7 +48,7 @@ class VehicleViews:
     ) -> None:
         self._time_scale = time_scale
         self._mission_id = mission_id
-        self.spec = spec
+        self._spec = spec
         """What the mission is to do, as it was said last."""
         self._frame = frame
         self._hub = hub
@@ -92,12 +92,12 @@ class VehicleViews:
             left_at=member.left_at,
             breach=self._breach(member.name),
             link=info.state,
-            reason=_reason(member, info) or _waits_for_the_others(member, self.spec),
+            reason=_reason(member, info) or _waits_for_the_others(member, self._spec()),
             age_s=None if heard_s is None else rounded(max(now().timestamp() - heard_s, 0.0), 2),
             address=info.address,
             imc_id=info.imc_id,
             surfacing=member.surfacing,
-            risings=member.risings,
+            risings=member.fixes.risings,
             pursuing=member.pursuing,
             phase=member.flown.phase,
             flown_m=round(member.flown.flown_m, 1),
@@ -125,7 +125,7 @@ class VehicleViews:
                 "battery_pct": rounded(report.battery_pct, 2),
                 "position_sd_m": rounded(report.position_sd_m, 3),
                 "swath_m": _swath_m(member.swath, report),
-                "localization": _position_quality(report.position_sd_m, self.spec.surface_policy),
+                "localization": _position_quality(report.position_sd_m, self._spec().surface_policy),
             }
         )
 
@@ -168,10 +168,11 @@ class VehicleViews:
 
     def _recovery(self, member: Member) -> dict[str, Any]:
         """Return what is shown of a vehicle's energy, its way home, and what is wrong with it."""
-        recovery, left, needs_s = self.spec.recovery_of(member.spec), member.energy.left, member.return_needs_s
+        recovery, left, home = self._spec().recovery_of(member.spec), member.energy.left, member.way_home
+        needs_s = home.needs_s
         turn_back_at = None
         if left is not None and needs_s is not None and math.isfinite(needs_s) and member.withdrawal is None:
-            slack_s = (left.safe_s - with_reserve_s(needs_s, member.drift_reserve_s)) / self._time_scale
+            slack_s = (left.safe_s - with_reserve_s(needs_s, home.drift_reserve_s)) / self._time_scale
             turn_back_at = (now() + timedelta(seconds=max(slack_s, 0.0))).replace(microsecond=0)
         over = member.withdrawal is not None and member.withdrawal.over
         active = [FailsafeView(failsafe=a.failsafe, response=a.response, message=a.message) for a in member.failsafes]
@@ -183,8 +184,8 @@ class VehicleViews:
             "recovery_point": None if recovery is None else recovery.point,
             "return_needs_s": None if needs_s is None or not math.isfinite(needs_s) else round(needs_s),
             "turn_back_at": turn_back_at,
-            "turn_back_point": self._lon_lats(member.turn_back_m)[0] if member.turn_back_m is not None else None,
-            "way_home": [] if over or member.way_home_m is None else self._lon_lats(member.way_home_m),
+            "turn_back_point": None if home.turn_back_m is None else self._lon_lats(home.turn_back_m)[0],
+            "way_home": [] if over or home.corners_m is None else self._lon_lats(home.corners_m),
             "failsafes": active,
         }
 

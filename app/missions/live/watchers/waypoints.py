@@ -1,6 +1,6 @@
 """The newest waypoint of each vehicle of a mission, as everyone who watches sees it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from app.storage.models import WaypointRow
 class WaypointViews:
     """Shows where vehicles were sent last and what became of it."""
 
-    def __init__(self, spec: MissionSpec, team: Team, broadcaster: Broadcaster) -> None:
+    def __init__(self, spec: Callable[[], MissionSpec], team: Team, broadcaster: Broadcaster) -> None:
         self._spec = spec
         self._team = team
         self._broadcaster = broadcaster
@@ -66,9 +66,9 @@ class WaypointViews:
                 "east_m": en_m[0],
                 "north_m": en_m[1],
                 "depth_m": place.depth_m,
-                "speed_mps": self._spec.speed_of(vehicle if member is None else member.spec),
-                "arrival_radius_m": self._spec.arrival_radius_m,
-                "min_altitude_m": self._spec.limits.min_altitude_m,
+                "speed_mps": self._spec().speed_of(vehicle if member is None else member.spec),
+                "arrival_radius_m": self._spec().arrival_radius_m,
+                "min_altitude_m": self._spec().limits.min_altitude_m,
                 "status": status,
                 "reason": reason,
             }

@@ -32,7 +32,7 @@ def send_on(live: LiveMission, member: Member, step: int) -> None:
     member.report = VehicleReport(member.name, 0.0, place)
     member.set_order(WaypointOrder(live.id, step, member.name, place, 1.0, 3.0, 1.0), np.array([9.0, 9.0]))
     member.link, member.status = LinkState.ENGAGED, WaypointStatus.ACKNOWLEDGED
-    member.leg_began_s, member.leg_allowed_s = asyncio.get_running_loop().time(), 0.0
+    member.leg.began_s, member.leg.allowed_s = asyncio.get_running_loop().time(), 0.0
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ async def test_who_is_left_alone_with_another_console_keeps_its_leg(late: tuple[
     live, dispatch = late
     first, second = live.team.members["a"], live.team.members["b"]
     for member in (first, second):
-        member.leg_allowed_s = 0.05
+        member.leg.allowed_s = 0.05
     first.link, first.engaged = LinkState.READY, False
     keeping = asyncio.create_task(dispatch.keep())
     await until(lambda: not second.ordered, "the other one is late")

@@ -226,18 +226,18 @@ async def test_who_waits_waits_no_longer_than_a_minute(scene: PlacedVehicles) ->
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     second = scene.put("b", THERE, (1.0, 30.0, 3.0))
     await scene.giving_way.look()
-    began_s = second.leg_began_s
+    began_s = second.leg.began_s
     scene.asides.of(Because.VEHICLE)["b"].since_s -= PATIENCE_S
     await scene.giving_way.look()
     assert scene.ordered[1] is second.order
-    assert second.leg_began_s == pytest.approx(began_s + PATIENCE_S, abs=5.0)
+    assert second.leg.began_s == pytest.approx(began_s + PATIENCE_S, abs=5.0)
 
 
 async def test_while_a_vehicle_gives_way_it_is_not_late_for_its_leg(scene: PlacedVehicles) -> None:
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     second = scene.put("b", THERE, (1.0, 30.0, 3.0))
     await scene.giving_way.look()
-    second.leg_allowed_s = 0.0
+    second.leg.allowed_s = 0.0
     assert second not in await scene.dispatch.settle_late([second])
     assert second.ordered
     await scene.asides.lead_on(second)
@@ -253,7 +253,7 @@ async def test_who_gives_way_again_and_again_is_late_for_its_leg_in_the_end(scen
         await scene.asides.lead_on(second)
     await scene.giving_way.look()
     assert second.waits_m is not None
-    second.leg_allowed_s = 0.0
+    second.leg.allowed_s = 0.0
     assert await scene.dispatch.settle_late([second]) == [second]
 
 

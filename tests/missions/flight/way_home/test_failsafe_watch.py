@@ -45,8 +45,8 @@ async def test_one_whose_way_home_cannot_be_told_keeps_nobody_from_looking_after
     # As a description of before this was checked has it.
     a.spec = a.spec.model_copy(update={"recovery_point": (lat, lon)})
     watch_of(live, service).look()
-    assert a.way_home_m is None
-    assert b.way_home_m is not None
+    assert a.way_home.corners_m is None
+    assert b.way_home.corners_m is not None
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 from app.missions.fleet.interface import LinkState, Position, VehicleReport
 from app.missions.flight.way_home.onboard_way import PERIOD_S, OnboardWays
 from app.missions.service import MissionService
+from app.missions.team import WayHome
 from imc_bridge.control.depth_layers import ALONE
 from simulator.event_loop import SimulatedTimeLoop
 from tests.support.missions.harbour import sim_spec
@@ -42,7 +43,7 @@ async def test_a_way_is_on_board_within_a_period_and_anew_when_it_has_changed(
         keeping, known_s = asyncio.create_task(ways.keep()), []
         for way in ([[10.0, 10.0]], [[30.0, 10.0]]):
             await asyncio.sleep(0.3 * PERIOD_S / time_scale)
-            member.way_left_alone_m = np.array(way)
+            member.way_home = WayHome(left_alone_m=np.array(way))
             known_s.append(asyncio.get_running_loop().time())
             await asyncio.sleep(2.0 * PERIOD_S / time_scale)
         keeping.cancel()
