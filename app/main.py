@@ -31,7 +31,7 @@ from app.api.accounts.roles import Role
 from app.api.accounts.sessions import SessionStore
 from app.api.accounts.tokens import TokenStore
 from app.api.bodies.admission import BodyMiddleware
-from app.api.bodies.budget import Budget
+from app.api.bodies.budget import BodyBudget
 from app.api.bodies.intake import Intakes
 from app.api.bodies.unread import UnreadBodyMiddleware
 from app.api.health import health_router
@@ -61,7 +61,7 @@ from app.storage.database import Database
 from app.storage.processes.membership import MembershipLostError
 from app.storage.queries.audit import Command
 from app.storage.upkeep.prepare import folder_of, prepare_database
-from app.supervision import Supervisor
+from app.supervision import SystemdNotifier
 from imc_bridge import PortInUseError
 
 SWITCH_S = 0.001
@@ -201,7 +201,7 @@ def _add_middleware(app: FastAPI, settings: Settings, limits: RequestLimits) -> 
     app.add_middleware(
         BodyMiddleware,
         intakes=Intakes(ROUTERS),
-        budget=Budget(settings.bytes_in_flight),
+        budget=BodyBudget(settings.bytes_in_flight),
         max_bytes=settings.max_body_bytes,
         max_file_bytes=settings.max_import_bytes,
         patience_s=settings.slow_client_s,
@@ -362,7 +362,7 @@ async def serve(
     sys.setswitchinterval(SWITCH_S)
     allow_descriptors(settings.max_connections)
     listening = listen(settings)
-    supervisor = Supervisor.of(os.environ)
+    supervisor = SystemdNotifier.of(os.environ)
 
     def written() -> bool:
         edge: EdgeState | None = getattr(app.state, "edge", None)

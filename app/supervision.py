@@ -18,8 +18,8 @@ BEATS = 3
 
 
 @dataclass(frozen=True)
-class Supervisor:
-    """Who supervises this process.
+class SystemdNotifier:
+    """Tells systemd, where that supervises this process, how the service is.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Supervisor:
     patience_s: float | None = None
 
     @classmethod
-    def of(cls, environment: Mapping[str, str]) -> "Supervisor":
+    def of(cls, environment: Mapping[str, str]) -> "SystemdNotifier":
         """Return the one that the environment names: ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``."""
         address = environment.get("NOTIFY_SOCKET", "")
         if address[:1] not in ("/", "@"):

@@ -12,7 +12,7 @@ from threading import Thread
 
 import pytest
 
-from app.supervision import Supervisor
+from app.supervision import SystemdNotifier
 from tests.support.commands import environment, serving
 from tests.support.waiting import until
 
@@ -110,7 +110,7 @@ def test_a_service_whose_loop_hangs_is_silent_and_says_where_it_hung_when_it_is_
 
 
 async def test_who_hangs_gives_no_sign_of_life(listening: socket.socket, tmp_path: Path) -> None:
-    supervisor = Supervisor(str(tmp_path / "notify"), patience_s=0.03)
+    supervisor = SystemdNotifier(str(tmp_path / "notify"), patience_s=0.03)
     async with supervisor.watching():
         await until(lambda: waiting(listening), "it lives")
         waiting(listening)
@@ -124,18 +124,21 @@ async def test_who_hangs_gives_no_sign_of_life(listening: socket.socket, tmp_pat
 @pytest.mark.parametrize(
     ("variables", "expected"),
     [
-        ({}, Supervisor()),
-        ({"NOTIFY_SOCKET": "relative/path", "WATCHDOG_USEC": "1000"}, Supervisor()),
-        ({"NOTIFY_SOCKET": "/run/notify"}, Supervisor("/run/notify")),
-        ({"NOTIFY_SOCKET": "@name", "WATCHDOG_USEC": "60000000"}, Supervisor("@name", 60.0)),
-        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "1000", "WATCHDOG_PID": "1"}, Supervisor("/n")),
-        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "1000", "WATCHDOG_PID": str(os.getpid())}, Supervisor("/n", 0.001)),
-        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "soon"}, Supervisor("/n")),
-        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "0"}, Supervisor("/n")),
+        ({}, SystemdNotifier()),
+        ({"NOTIFY_SOCKET": "relative/path", "WATCHDOG_USEC": "1000"}, SystemdNotifier()),
+        ({"NOTIFY_SOCKET": "/run/notify"}, SystemdNotifier("/run/notify")),
+        ({"NOTIFY_SOCKET": "@name", "WATCHDOG_USEC": "60000000"}, SystemdNotifier("@name", 60.0)),
+        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "1000", "WATCHDOG_PID": "1"}, SystemdNotifier("/n")),
+        (
+            {"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "1000", "WATCHDOG_PID": str(os.getpid())},
+            SystemdNotifier("/n", 0.001),
+        ),
+        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "soon"}, SystemdNotifier("/n")),
+        ({"NOTIFY_SOCKET": "/n", "WATCHDOG_USEC": "0"}, SystemdNotifier("/n")),
     ],
 )
-def test_the_environment_names_the_supervisor(variables: dict[str, str], expected: Supervisor) -> None:
-    assert Supervisor.of(variables) == expected
+def test_the_environment_names_the_supervisor(variables: dict[str, str], expected: SystemdNotifier) -> None:
+    assert SystemdNotifier.of(variables) == expected
 
 
 def test_a_name_that_is_no_file_is_reached_too(tmp_path: Path) -> None:
@@ -143,16 +146,16 @@ def test_a_name_that_is_no_file_is_reached_too(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
         sock.bind(f"\0{name}")
         sock.settimeout(240)
-        Supervisor(f"@{name}").tell(READY="1")
+        SystemdNotifier(f"@{name}").tell(READY="1")
         assert sock.recv(100) == b"READY=1"
 
 
 def test_a_supervisor_that_does_not_listen_is_no_reason_to_end(tmp_path: Path) -> None:
-    supervisor = Supervisor(str(tmp_path / "notify"))
+    supervisor = SystemdNotifier(str(tmp_path / "notify"))
     supervisor.tell(READY="1")
     assert list(tmp_path.iterdir()) == [], "nothing is made in its place"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
         sock.bind(str(tmp_path / "notify"))
         supervisor.tell(STATUS="it listens now")
-        Supervisor().tell(STATUS="to nobody")
+        SystemdNotifier().tell(STATUS="to nobody")
         assert waiting(sock) == ["STATUS=it listens now"]

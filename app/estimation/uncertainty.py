@@ -52,7 +52,7 @@ class SoundingErrors(BaseModel):
 
 
 @dataclass(frozen=True)
-class BeamGeometry:
+class BeamPaths:
     """Where beams went, arrays (n,).
 
     Attributes
@@ -80,7 +80,7 @@ class BeamGeometry:
         return self.down_m * self.slope
 
 
-Sensitivity = Callable[[BeamGeometry], FloatArray]
+Sensitivity = Callable[[BeamPaths], FloatArray]
 Deviation = Callable[[SoundingErrors], float]
 
 
@@ -106,19 +106,19 @@ class Component:
     scatters: bool = False
 
 
-def _none(beams: BeamGeometry) -> FloatArray:
+def _none(beams: BeamPaths) -> FloatArray:
     return np.zeros_like(beams.down_m)
 
 
-def _one(beams: BeamGeometry) -> FloatArray:
+def _one(beams: BeamPaths) -> FloatArray:
     return np.ones_like(beams.down_m)
 
 
-def _turned_down(beams: BeamGeometry) -> FloatArray:
+def _turned_down(beams: BeamPaths) -> FloatArray:
     return np.radians(beams.across_m)
 
 
-def _turned_aside(beams: BeamGeometry) -> FloatArray:
+def _turned_aside(beams: BeamPaths) -> FloatArray:
     return np.radians(beams.down_m)
 
 
@@ -201,7 +201,7 @@ class Uncertainty:
         return np.asarray(np.hypot(self.scattered_sd_m, self.shared_sd_m))
 
 
-def uncertainty(beams: BeamGeometry, errors: SoundingErrors, position_sd_m: FloatArray | None = None) -> Uncertainty:
+def uncertainty(beams: BeamPaths, errors: SoundingErrors, position_sd_m: FloatArray | None = None) -> Uncertainty:
     """Return how uncertain the soundings of beams are.
 
     Parameters

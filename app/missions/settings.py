@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Current = Annotated[float, Field(ge=-10, le=10)]
 
 
-class Section(BaseModel):
+class SettingsSection(BaseModel):
     """A section of the settings; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -29,7 +29,7 @@ class ImcSettings(ConsoleSettings):
     enabled: bool = Field(default=True, description="Listen for IMC vehicles and speak to them")
 
 
-class NeptusSettings(Section):
+class NeptusSettings(SettingsSection):
     """The gateway for Neptus' ConvCAO panel. Area and depths have to be the same as in the panel's own settings."""
 
     enabled: bool = Field(default=False, description="Answer Neptus' ConvCAO panel in place of the original service")
@@ -114,7 +114,7 @@ class NeptusSettings(Section):
         return self
 
 
-class SimulationSettings(Section):
+class SimulationSettings(SettingsSection):
     """The sea floor under vehicles of kind ``sim``, which are simulated inside the service."""
 
     terrain: OptionalFile = Field(default=None, description="Terrain file; without one a sea floor is generated")
@@ -143,7 +143,7 @@ class SimulationSettings(Section):
         return family
 
 
-class AisSettings(Section):
+class AisSettings(SettingsSection):
     """Ships about, by AIS. Without udp_port, tcp_host and file nothing is listened for."""
 
     udp_address: str = Field(
@@ -193,7 +193,7 @@ class AisSettings(Section):
         return address
 
 
-class ProviderSettings(Section):
+class ProviderSettings(SettingsSection):
     """Who hands soundings in as crowdsourced bathymetry (IHO B-12)."""
 
     organization: str = Field(default="", max_length=200, description="Name of the organization; B-12 asks for it")
@@ -222,7 +222,7 @@ class ProviderSettings(Section):
 Question = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*$")]
 
 
-class ServiceSettings(Section):
+class ServiceSettings(SettingsSection):
     """Everything the mission service needs to know."""
 
     database_url: str = Field(

@@ -32,7 +32,7 @@ from app.compute.settings import ComputeSettings
 from app.missions.fleet.interface import LinkCapabilities
 from app.missions.forecast.request import starts_of
 from app.missions.forecast.simulate import floors_under, fly_over
-from app.missions.forecast.swarm import Flown, SoFar
+from app.missions.forecast.swarm import FlightOutcome, SoFar
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.work_processes import WorkProcesses
 from app.missions.spec.mission import MissionSpec
@@ -86,9 +86,9 @@ async def maps(tables: Sequence[FloatArray], side_m: float, compute: Compute | N
         return list(await asyncio.gather(*made))
 
 
-async def forecasts(specs: Sequence[MissionSpec], compute: Compute | None) -> list[Flown]:
+async def forecasts(specs: Sequence[MissionSpec], compute: Compute | None) -> list[FlightOutcome]:
     team = Team(lambda _kind: LinkCapabilities())
-    flights: list[Awaitable[Flown]] = []
+    flights: list[Awaitable[FlightOutcome]] = []
     for spec in specs:
         members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
         starts, _ = starts_of(spec, members)
@@ -98,7 +98,7 @@ async def forecasts(specs: Sequence[MissionSpec], compute: Compute | None) -> li
     return list(await asyncio.gather(*flights))
 
 
-async def _here(work: Callable[P, Flown], *arguments: P.args, **named: P.kwargs) -> Flown:
+async def _here(work: Callable[P, FlightOutcome], *arguments: P.args, **named: P.kwargs) -> FlightOutcome:
     return work(*arguments, **named)
 
 

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from app.arrays import FloatArray
-from app.estimation.uncertainty import COMPONENTS, SOUND_SPEED_MPS, BeamGeometry, SoundingErrors, uncertainty
+from app.estimation.uncertainty import COMPONENTS, SOUND_SPEED_MPS, BeamPaths, SoundingErrors, uncertainty
 
 DRAWN = 40_000
 
 
-def beam(angle_deg: float, down_m: float = 20.0, pitch_deg: float = 0.0, count: int = 1) -> BeamGeometry:
-    return BeamGeometry(
+def beam(angle_deg: float, down_m: float = 20.0, pitch_deg: float = 0.0, count: int = 1) -> BeamPaths:
+    return BeamPaths(
         np.full(count, np.radians(angle_deg)), np.full(count, down_m), np.full(count, np.radians(pitch_deg))
     )
 

@@ -7,7 +7,7 @@ from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.bodies.budget import Budget, Lease
+from app.api.bodies.budget import BodyBudget, Lease
 from app.api.bodies.intake import BodyKind, Intake, Intakes, declared_bytes, has_body
 from app.api.http.error_handlers import answer_to
 from app.api.http.problems import ProblemError
@@ -42,7 +42,7 @@ class BodyMiddleware:
     """
 
     def __init__(
-        self, app: ASGIApp, intakes: Intakes, budget: Budget, max_bytes: int, max_file_bytes: int, patience_s: float
+        self, app: ASGIApp, intakes: Intakes, budget: BodyBudget, max_bytes: int, max_file_bytes: int, patience_s: float
     ) -> None:
         self.app = app
         self.intakes = intakes

@@ -10,7 +10,7 @@ from app.api.http.problems import ProblemError
 RETRY_S = 5
 
 
-class Budget:
+class BodyBudget:
     """Bytes of bodies that are being received or worked on.
 
     Whoever has nothing under way gets what is free. Whoever has gets no more than half of what the others leave: so
@@ -70,7 +70,7 @@ class Budget:
 class Lease:
     """Bytes that one request holds."""
 
-    budget: Budget
+    budget: BodyBudget
     client: str
     held: int = 0
 

@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 from app.arrays import BoolArray, FloatArray
 from app.estimation.adjustment.drift import LEAST_FIX_M, DriftModel, Nodes
 from app.estimation.adjustment.least_squares import DriftModels, LeastSquares, Solution, WeighedTies
-from app.estimation.adjustment.ties import Known, Matcher, Outcome, Relief, Sections, Tie, rms
+from app.estimation.adjustment.ties import KnownShift, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
 
 ROUNDS, LAST_ROUNDS = 4, 2
@@ -215,7 +215,7 @@ class _Adjustment:
             east, north = self.places(state.offset_m)
 
             def one(
-                k: int, east: FloatArray = east, north: FloatArray = north, known: list[Known] = known
+                k: int, east: FloatArray = east, north: FloatArray = north, known: list[KnownShift] = known
             ) -> Tie | None:
                 return self._matcher.tie(k, east, north, known[k], self._most_m) if used[k] else None
 
@@ -234,7 +234,7 @@ class _Adjustment:
             state = replace(state, ties=WeighedTies(ties, targets, weights))
         return state
 
-    def _known(self, state: Solution) -> list[Known]:
+    def _known(self, state: Solution) -> list[KnownShift]:
         """Return for each section what is known of its shift, without its own tie, beyond a state's errors."""
         sections, nodes = self._matcher.sections, self._matcher.nodes
         combined = nodes.interpolation(sections.vehicle, sections.middle_s).tolil()
@@ -251,7 +251,7 @@ class _Adjustment:
                 precision = np.linalg.inv(covariance) - 0.98 * weight * tie.information
                 low, axes = np.linalg.eigh(precision)
                 covariance = (axes / np.maximum(low, 1e-3)) @ axes.T
-            found.append(Known(mean, covariance))
+            found.append(KnownShift(mean, covariance))
         return found
 
     def compare(self, held: BoolArray, by_fixes: Solution, tried: Solution) -> HeldOut | None:

@@ -17,7 +17,7 @@ LAGS_M = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0])
 LEAST_EXPONENT, LARGEST_EXPONENT = 0.4, 1.8
 
 
-class Soundings(NamedTuple):
+class SoundingColumns(NamedTuple):
     """Soundings as compiled functions read them: places, depths and their standard deviations, metres, (n,) each."""
 
     east: FloatArray
@@ -75,7 +75,7 @@ class _Bins(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def half_squares(section: IntArray, soundings: Soundings, lags: FloatArray) -> tuple[FloatArray, FloatArray]:
+def half_squares(section: IntArray, soundings: SoundingColumns, lags: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return sums of half the squared differences of depth within sections, less their noise, and counts, by lag."""
     east, north, depth, noise = soundings
     total, count = np.zeros(len(lags)), np.zeros(len(lags))
@@ -92,7 +92,7 @@ def half_squares(section: IntArray, soundings: Soundings, lags: FloatArray) -> t
     return total, count
 
 
-def variogram(section: IntArray, soundings: Soundings) -> PowerLaw:
+def variogram(section: IntArray, soundings: SoundingColumns) -> PowerLaw:
     """Return the power law that half the squared differences of depth follow within sections (n,)."""
     total, count = half_squares(section, soundings, LAGS_M)
     used = (count > 20) & (total > 0.0)
@@ -135,7 +135,7 @@ def _solve(a: FloatArray, b: FloatArray, n: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _binned(soundings: Soundings, raster: Raster, rows: int, cols: int, reach: float) -> _Bins:
+def _binned(soundings: SoundingColumns, raster: Raster, rows: int, cols: int, reach: float) -> _Bins:
     """Sort soundings into cells, those within ``reach`` metres of a raster among them."""
     east, north = soundings.east, soundings.north
     border = int(np.ceil(reach / raster.cell))
@@ -161,7 +161,14 @@ def _binned(soundings: Soundings, raster: Raster, rows: int, cols: int, reach: f
 
 @njit(cache=True, nogil=True)
 def _nearest_by_quadrant(
-    soundings: Soundings, raster: Raster, bins: _Bins, r: int, c: int, reach: float, found: IntArray, away: FloatArray
+    soundings: SoundingColumns,
+    raster: Raster,
+    bins: _Bins,
+    r: int,
+    c: int,
+    reach: float,
+    found: IntArray,
+    away: FloatArray,
 ) -> None:
     """Write the nearest soundings of a cell in each quadrant and how far they are, (4, PER_QUADRANT); -1 and inf: none.
 
@@ -200,7 +207,7 @@ def _nearest_by_quadrant(
 
 @njit(cache=True, nogil=True)
 def _kriging_system(
-    soundings: Soundings, near: IntArray, e0: float, n0: float, relief: PowerLaw, a: FloatArray, x: FloatArray
+    soundings: SoundingColumns, near: IntArray, e0: float, n0: float, relief: PowerLaw, a: FloatArray, x: FloatArray
 ) -> None:
     """Write the matrix (m + 1, m + 1) and right side (m + 1,) of ordinary kriging from soundings ``near`` (m,)."""
     east, north, sd = soundings.east, soundings.north, soundings.sd
@@ -220,7 +227,7 @@ def _kriging_system(
 
 @njit(cache=True, nogil=True)
 def surface(
-    soundings: Soundings, raster: Raster, wanted: BoolArray, relief: PowerLaw, reach: float
+    soundings: SoundingColumns, raster: Raster, wanted: BoolArray, relief: PowerLaw, reach: float
 ) -> tuple[Surface, Shares]:
     """Predict the depth at the centres of a raster's cells by ordinary kriging, from soundings within ``reach`` metres.
 

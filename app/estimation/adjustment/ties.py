@@ -98,13 +98,13 @@ class Relief:
     @classmethod
     def of_sections(cls, soundings: TrackSoundings, sections: Sections) -> "Relief":
         """Learn it from soundings of the same sections, whose places to each other are known."""
-        columns = surface.Soundings(soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m)
+        columns = surface.SoundingColumns(soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m)
         factor, exponent = surface.variogram(sections.of, columns)
         factors = np.full(len(sections), factor)
         middle = np.concatenate([[0.25], 0.5 * (surface.LAGS_M[1:] + surface.LAGS_M[:-1])])
         for k in range(len(sections)):
             rows = slice(sections.first[k], sections.first[k + 1])
-            own_columns = surface.Soundings(*(column[rows] for column in columns))
+            own_columns = surface.SoundingColumns(*(column[rows] for column in columns))
             total, count = surface.half_squares(sections.of[rows], own_columns, surface.LAGS_M)
             near = slice(1, 6)
             if count[near].sum() >= 20:
@@ -117,7 +117,7 @@ class Relief:
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownShift:
     """What is known of a section's shift before it is looked at: mean (2,) and covariance (2, 2), metres."""
 
     mean_m: FloatArray
@@ -210,7 +210,7 @@ class Matcher:
             return None
         raster = surface.Raster(west, south, self.cell_m)
         wanted = surface.near_track(east, north, raster, high, cols, aside_m)
-        others = surface.Soundings(east_m[who], north_m[who], found.depth_m[who], found.sd_m[who])
+        others = surface.SoundingColumns(east_m[who], north_m[who], found.depth_m[who], found.sd_m[who])
         relief = surface.PowerLaw(float(self.relief.factor[section]), self.relief.exponent)
         return Around(who, raster, *surface.surface(others, raster, wanted, relief, self.reach_m))
 
@@ -235,7 +235,7 @@ class Matcher:
         y = (north_m[rows] - raster.south) / raster.cell - 0.5
         return misfit.SectionSoundings(x, y, self.soundings.depth_m[rows], self.soundings.sd_m[rows] ** 2)
 
-    def tie(self, section: int, east_m: FloatArray, north_m: FloatArray, known: Known, most_m: float) -> Tie:
+    def tie(self, section: int, east_m: FloatArray, north_m: FloatArray, known: KnownShift, most_m: float) -> Tie:
         """Return how far a section is shifted against the others.
 
         Parameters
@@ -333,7 +333,7 @@ def rms(off: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.minimum(np.abs(off), 3.0 * usual + 1e-9) ** 2)))
 
 
-def _told(mean: FloatArray, covariance: FloatArray, known: Known) -> tuple[FloatArray, FloatArray]:
+def _told(mean: FloatArray, covariance: FloatArray, known: KnownShift) -> tuple[FloatArray, FloatArray]:
     """Return what was added to what was known, as a shift (2,) and its information (2, 2)."""
     # In coordinates in which what was known is a unit circle.
     root = np.linalg.cholesky(known.covariance)

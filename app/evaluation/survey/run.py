@@ -20,7 +20,8 @@ from app.evaluation.survey.world import (
     stationary_map,
     unknown_belief,
 )
-from app.exploration.core.routes import FreeSpace, Turns, Vehicles
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, Vehicles
 from app.exploration.lines.even_survey import Pattern, even_survey
 from app.exploration.lines.lattice import Sweep, longer_axis_rad
 from app.exploration.lines.lawnmower import lawnmower_routes

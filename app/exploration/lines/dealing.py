@@ -10,7 +10,8 @@ from typing import TypeVar
 import numpy as np
 
 from app.arrays import FloatArray
-from app.exploration.core.routes import FreeSpace, Turns, Vehicles, flown_m
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, Vehicles, flown_m
 
 HALVINGS = 8
 """How often the share of what vehicles can fly is halved in: to less than a hundredth."""

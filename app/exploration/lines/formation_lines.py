@@ -15,7 +15,7 @@ from shapely.prepared import PreparedGeometry, prep
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.lines.lattice import axes_of
 
 EDGE = 0.01

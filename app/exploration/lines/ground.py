@@ -8,7 +8,8 @@ from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.routes import FreeSpace, Turns, flown_m
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, flown_m
 
 NODES = 5000
 """In the rectangle around an area."""

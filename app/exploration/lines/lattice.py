@@ -9,7 +9,8 @@ from shapely import Polygon, minimum_rotated_rectangle
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.routes import FreeSpace, Turns, flown_m
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, flown_m
 
 SHARE_SAMPLES = 200
 MAX_LINES = 2000

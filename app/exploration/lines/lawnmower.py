@@ -14,16 +14,9 @@ from shapely import LineString, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import (
-    CORNER_TOLERANCE,
-    FreeSpace,
-    Turns,
-    Vehicles,
-    metres_left,
-    next_waypoint,
-    vertices_passed,
-)
+from app.exploration.core.routes import CORNER_TOLERANCE, Turns, Vehicles, metres_left, next_waypoint, vertices_passed
 from app.exploration.lines.even_survey import Pattern, fullest_surveys
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.given_lines import GivenLine, LinePlan, given_survey

@@ -10,7 +10,7 @@ from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray, IntArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 
 
 def parts_of(constraints: Constraints, free: FreeSpace, en_m: FloatArray) -> Iterator[tuple[Constraints, IntArray]]:

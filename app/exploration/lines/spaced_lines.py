@@ -7,7 +7,8 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace, Turns, Vehicles
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, Vehicles
 from app.exploration.lines.dealing import PARTS, WHOLE_LINES, least_share
 from app.exploration.lines.even_survey import EvenSurvey, Pattern, survey_of
 from app.exploration.lines.lattice import MAX_LINES, Sweep, axes_of, even_lines, route_length

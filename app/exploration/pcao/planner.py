@@ -11,8 +11,9 @@ from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import inside_area
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import FreeSpace, next_waypoint
+from app.exploration.core.routes import next_waypoint
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.model import default_model
 from app.exploration.pcao.state import reduced_state

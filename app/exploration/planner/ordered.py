@@ -13,9 +13,10 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.open_ground import OpenGround
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import SAME_M, FreeSpace
+from app.exploration.core.routes import SAME_M
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.base import PlannerBase, at_depth
 

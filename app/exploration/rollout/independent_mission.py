@@ -10,6 +10,7 @@ from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Situation
 from app.exploration.planner.options import PlannerOptions
+from app.exploration.rollout.allowed_raster import AllowedRaster, clear_ways, settle_waypoint
 from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import (
     HELD_NEAR,
@@ -20,7 +21,6 @@ from app.exploration.rollout.floor import (
     let_stay,
     margin_m,
 )
-from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.independent_routes import (
     Routes,
     RoutesFlown,
@@ -81,8 +81,8 @@ class ApartMission:
     """Everything about a step that routes are judged by."""
 
     def __init__(
-        self, team: Situation, free_part: FloatArray, floor: FloorEstimate, free: Free, rules: Rules, height_m: float,
-        lower_m: float, accuracy_sd_m: float, rng: np.random.Generator,
+        self, team: Situation, free_part: FloatArray, floor: FloorEstimate, free: AllowedRaster, rules: Rules,
+        height_m: float, lower_m: float, accuracy_sd_m: float, rng: np.random.Generator,
     ) -> None:  # fmt: skip
         belief = team.belief
         self._start = np.ascontiguousarray(team.positions)
@@ -178,7 +178,7 @@ def apart_mission(
     free_part: FloatArray,
     bottom: Bottom,
     felt_m: FloatArray,
-    free: Free,
+    free: AllowedRaster,
     sensor: RangeSensor,
     options: PlannerOptions,
     rng: np.random.Generator,

@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
+from app.exploration.rollout.allowed_raster import AllowedRaster, clear_ways, settle_waypoint
 from app.exploration.rollout.flight import PER_WAYPOINT, STEEP, Plan, Rules, advance
 from app.exploration.rollout.floor import FloorEstimate, sample
-from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.local_search import change
 from app.exploration.rollout.points import LandmarkPoints, lacks, look_whole
 
@@ -223,7 +223,13 @@ class RoutesTask(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def improve_apart(
-    best: RoutesFlown, score: float, trial: RoutesFlown, draws: FloatArray, task: RoutesTask, free: Free, worth: float
+    best: RoutesFlown,
+    score: float,
+    trial: RoutesFlown,
+    draws: FloatArray,
+    task: RoutesTask,
+    free: AllowedRaster,
+    worth: float,
 ) -> float:
     """Try a change to one vehicle's route per row of ``draws`` and keep those that better the score by ``worth``.
 

@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
+from app.exploration.rollout.allowed_raster import AllowedRaster, clear_ways, insert, settle_waypoint
 from app.exploration.rollout.flight import DIVE, STEEP, FlownPlan, Plan, Rules, Task, Work, fly_plan
-from app.exploration.rollout.free_space import Free, clear_ways, insert, settle_waypoint
 
 DRAWS = 8
 """Random numbers that one change uses, uniform in [0, 1)."""
@@ -284,7 +284,14 @@ def change(
 
 @njit(cache=True, nogil=True)
 def improve(
-    flown: FlownPlan, count: int, score: float, trial: FlownPlan, draws: FloatArray, task: Task, free: Free, link: float
+    flown: FlownPlan,
+    count: int,
+    score: float,
+    trial: FlownPlan,
+    draws: FloatArray,
+    task: Task,
+    free: AllowedRaster,
+    link: float,
 ) -> tuple[int, float]:
     """Try one change per row of ``draws`` and keep those that better the score.
 

@@ -17,11 +17,12 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.information_need import Lacking, lacking
 from app.exploration.core.problem import Belief, Proposal, Situation
-from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import OF_CAO, PlannerOptions
+from app.exploration.rollout.allowed_raster import AllowedRaster, allowed_raster, clear_ways, settle_waypoint
 from app.exploration.rollout.flight import (
     DIVE,
     LIFTED_AT_LEISURE,
@@ -40,7 +41,6 @@ from app.exploration.rollout.flight import (
     new_checkpoints,
 )
 from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m, sample
-from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.independent_routes import stops_of
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
@@ -133,7 +133,7 @@ class RolloutPlanner(PlannerBase):
         self._heights: FloatArray = np.zeros(0)
         self._sinking: FloatArray = np.zeros(0)
         self._planned = 0
-        self._free: tuple[Constraints, Free] | None = None
+        self._free: tuple[Constraints, AllowedRaster] | None = None
         self._felt = FeltBottom()
         self._routes: dict[str, FloatArray] = {}
         self._away: dict[str, float] = {}
@@ -178,7 +178,7 @@ class RolloutPlanner(PlannerBase):
             away = team.targets is not None or team.localization is not None
             self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
-            self._free = (team.constraints, free_space(team.constraints))
+            self._free = (team.constraints, allowed_raster(team.constraints))
         self._felt.feel(team)
         deeper_m, bottom = self._look_for_unseen(team, bottom)
         mission = _Mission(
@@ -226,7 +226,7 @@ class RolloutPlanner(PlannerBase):
         self._felt.feel(team)
         constraints = team.constraints
         if self._free is None or not _same(self._free[0], constraints):
-            self._free = (constraints, free_space(constraints))
+            self._free = (constraints, allowed_raster(constraints))
         self._away = {name: self._away.get(name, 0.0) for name in whole.vehicles}
         for name in whole.vehicles:
             self._away[name] += (float(name not in team.vehicles) - self._away[name]) / AWAY_STEPS
@@ -324,7 +324,7 @@ class _Mission:
         felt_m: FloatArray,
         deeper_m: FloatArray,
         least_m: FloatArray,
-        free: Free,
+        free: AllowedRaster,
         sensor: RangeSensor,
         options: PlannerOptions,
         rng: np.random.Generator,

@@ -9,7 +9,7 @@ from app.arrays import FloatArray, IntArray
 from app.exploration.site_search.base import SearchPlanner, hold
 from app.exploration.site_search.gains import Gains, take
 from app.exploration.site_search.goal_parts import GoalPart, goal_left, parts_left
-from app.exploration.site_search.ground import UNREACHED, Ground
+from app.exploration.site_search.ground import UNREACHED, SiteGround
 from app.exploration.site_search.scene import Scene
 
 ELSEWHERE = 0.02
@@ -71,7 +71,7 @@ class FrontierSearch(SearchPlanner):
             if self._views.get(name) == (int(place[0]), int(place[1])):
                 self._spent.append(self._views[name])
 
-    def _views_to_weigh(self, ground: Ground, ways: list[NDArray[np.int32]]) -> IntArray:
+    def _views_to_weigh(self, ground: SiteGround, ways: list[NDArray[np.int32]]) -> IntArray:
         """Return cells (n, 2) of a lattice that a vehicle can get to, and those that vehicles are under way to."""
         reached = np.minimum.reduce(ways) < UNREACHED
         lattice = np.zeros_like(reached)

@@ -22,7 +22,7 @@ EVERY, SLACK = 0.1, 0.02
 
 
 @dataclass(frozen=True)
-class Ground:
+class SiteGround:
     """The site for one decision. Places are cells' (row, column).
 
     Attributes
@@ -42,13 +42,13 @@ class Ground:
     _beside: dict[tuple[float, float], IntArray] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, task: SearchTask) -> "Ground":
+    def of(cls, task: SearchTask) -> "SiteGround":
         """Make it from what is known now."""
         hazard = task.states != Cell.EXPLORED
         return cls(task, hazard, _away_from(hazard, _within(_margin(task))) & ~_taken(task))
 
     @classmethod
-    def for_legs(cls, task: SearchTask) -> "Ground":
+    def for_legs(cls, task: SearchTask) -> "SiteGround":
         """Make it for nothing but :meth:`clear`, which takes less: no place of it is passable."""
         hazard = task.states != Cell.EXPLORED
         return cls(task, hazard, np.zeros_like(hazard))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from app.arrays import FloatArray
 from app.exploration.core.problem import Situation
 from app.exploration.core.search_task import SearchTask
-from app.exploration.site_search.ground import Ground
+from app.exploration.site_search.ground import SiteGround
 
 HOME_STEPS = 3.0
 """Steps from the entry, times vehicles, within which a vehicle counts as being there."""
@@ -28,7 +28,7 @@ class Scene:
 
     team: Situation
     task: SearchTask
-    ground: Ground
+    ground: SiteGround
     home: NDArray[np.int32]
     home_m: FloatArray
 
@@ -50,7 +50,7 @@ class Scene:
 
     @classmethod
     def _made(cls, team: Situation, task: SearchTask) -> "Scene":
-        ground = Ground.of(task)
+        ground = SiteGround.of(task)
         home = ground.distances(ground.places(task.entry_m[None]))
         return cls(team, task, ground, home, _with_spare(team, task, ground.metres(home)))
 

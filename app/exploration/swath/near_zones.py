@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 from app.arrays import FloatArray, IntArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.swath.raster import Flying
 
 SAME_M = 0.01

@@ -8,8 +8,8 @@ from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.coverage import Coverage, SwathTask
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import FreeSpace
 from app.exploration.lines.lattice import direction_of_lines_rad
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.swath.near_zones import BarredGround

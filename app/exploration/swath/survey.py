@@ -11,7 +11,7 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.core.coverage import Coverage
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.swath.assignment import Assignment, FlownLine, Question, recalled
 from app.exploration.swath.crosslines import crosslines as crosslines_over
 from app.exploration.swath.entries import nearest_entry

@@ -14,7 +14,7 @@ _NAMESPACE = uuid.UUID("6f0f6a52-9f0e-4d53-8d0d-6a4f5f0f2f5b")
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class EscalationStep:
     """Somebody who is told when nobody has acknowledged for so long."""
 
     recipient: str
@@ -23,16 +23,18 @@ class Step:
 
 def steps(
     settings: AlarmSettings, kind: AlarmKind, severity: AlarmSeverity, mission_id: str | None, mission_name: str
-) -> list[Step]:
+) -> list[EscalationStep]:
     """Return who is told of an alarm, each once, the first ones first."""
     least_s: dict[str, float] = {}
     for route in _matching(settings, kind, severity, mission_id, mission_name):
         for recipient in route.to:
             least_s[recipient] = min(route.after_s, least_s.get(recipient, route.after_s))
-    return sorted((Step(*item) for item in least_s.items()), key=lambda step: step.after_s)
+    return sorted((EscalationStep(*item) for item in least_s.items()), key=lambda step: step.after_s)
 
 
-def due(ladder: Sequence[Step], told_after_s: float | None, age_s: float) -> tuple[list[Step], float | None]:
+def due(
+    ladder: Sequence[EscalationStep], told_after_s: float | None, age_s: float
+) -> tuple[list[EscalationStep], float | None]:
     """Return who is to be told now of an alarm that is so old, and after how long somebody is next; None: nobody is.
 
     ``told_after_s`` is up to which step was told already; None: nobody was.

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.lines.flown_lines import flown_lines, length_m, line_now
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions import states

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.missions.flight.decisions.deciding import Decider, moved_on, place_ahead
 from app.missions.flight.decisions.decision import Decision
 from app.missions.flight.decisions.leg import Leg, Place

@@ -16,7 +16,7 @@ from app.arrays import FloatArray
 from app.exploration.cao.planner import CaoPlanner
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.lines.lattice import direction_of_lines_rad
 from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.planners import COVERERS
@@ -36,7 +36,7 @@ from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
-from app.missions.safety import free_space
+from app.missions.safety import room
 from app.missions.spec.mission import MissionSpec, PlannerSpec
 from app.missions.task.constraints import from_outside, make_constraints
 from app.missions.task.planner import make_planner, turn_radius_m
@@ -62,7 +62,7 @@ zones for so many times fewer. Even lines stand in for its own where there are m
 
 
 @dataclass(frozen=True)
-class PlannedWay:
+class VehiclePlan:
     """What one vehicle would do.
 
     Attributes
@@ -116,7 +116,7 @@ class LeftOut:
 class Plan:
     """The ways of a team, and whether they were found in the time allowed; else they end early."""
 
-    ways: list[PlannedWay]
+    ways: list[VehiclePlan]
     whole: bool
     own: bool
     """Whether they are the planner's own; else even lines stand in for them."""
@@ -155,7 +155,7 @@ def plan(
     depth_m = floor_depth_m or max(LEAST_GUESS_M, cruise_m + spec.limits.min_altitude_m + ROOM_M)
     constraints = make_constraints(spec)
     inner = Polygon(constraints.area)
-    begin_m = np.array([free_space.nearest_inside(inner, start) for start in starts_m])
+    begin_m = np.array([room.nearest_inside(inner, start) for start in starts_m])
 
     def over() -> bool:
         return stop() or time.thread_time() > until
@@ -328,7 +328,7 @@ def _clock_s(spec: MissionSpec, member: Member, corners: FloatArray) -> FloatArr
     return clock_s
 
 
-def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: FloatArray) -> PlannedWay:
+def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: FloatArray) -> VehiclePlan:
     speed, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
     along = _along(corners)
     turn_s, clock_s = _turns_s(spec, member, corners), _clock_s(spec, member, corners)
@@ -345,7 +345,7 @@ def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: F
 
     way_home = home_from(corners[-1])
     left_s = _left_s(spec, member)
-    planned = PlannedWay(
+    planned = VehiclePlan(
         name=member.name,
         corners_m=corners,
         distance_m=float(along[-1]),

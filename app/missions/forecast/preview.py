@@ -15,7 +15,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.compilation import Compilation
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.hub import FleetHub
-from app.missions.forecast.plan import SAME_M, Plan, PlannedWay, plan
+from app.missions.forecast.plan import SAME_M, Plan, VehiclePlan, plan
 from app.missions.forecast.ranges import ForecastRange
 from app.missions.forecast.request import described_team, starts_of
 from app.missions.forecast.whole_survey import WholeSurveyView, whole_view
@@ -179,7 +179,7 @@ def _whole(found: Plan) -> WholeSurveyView | None:
     return whole_view([found.whole_survey], within_budget=within)
 
 
-def _vehicle(way: PlannedWay, frame: LocalFrame) -> PlannedVehicleView:
+def _vehicle(way: VehiclePlan, frame: LocalFrame) -> PlannedVehicleView:
     home = None if way.way_home_m is None else np.vstack([way.corners_m[-1], way.way_home_m])
     at = None if way.turn_back_m is None else _places(way.place_m(way.turn_back_m)[None], frame)[0]
     return PlannedVehicleView(

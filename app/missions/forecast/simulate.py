@@ -15,7 +15,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.missions.flight.decisions.decision import Knowledge, decide
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
-from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm, planner_of, poses_apart
+from app.missions.forecast.swarm import FlightOutcome, SoFar, StepFlown, Swarm, planner_of, poses_apart
 from app.missions.forecast.swath_flight import sweep_over, sweeps
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
@@ -49,7 +49,7 @@ BEAMS_RAD = {
 class Forecast:
     """Flights over several floors that are as likely as each other; at least one."""
 
-    flights: list[Flown]
+    flights: list[FlightOutcome]
     floors: list[Floor]
 
     @property
@@ -88,7 +88,7 @@ def forecast(
         Asked at every step whether anyone still wants to know.
     """
     begun = time.monotonic()
-    flights: list[Flown] = []
+    flights: list[FlightOutcome] = []
     floors: list[Floor] = []
     for floor in floors_under(spec, members, so_far, floor_depth_m):
         if flights and (stop() or time.monotonic() - begun > patience_s):
@@ -113,7 +113,7 @@ def fly_over(
     so_far: SoFar,
     budget_s: float,
     stop: Callable[[], bool] = lambda: False,
-) -> Flown:
+) -> FlightOutcome:
     """Fly a mission ahead over one floor; see :func:`forecast`."""
     if sweeps(spec):
         return sweep_over(floor, spec, members, starts_m, so_far, budget_s, stop)
@@ -134,7 +134,7 @@ def fly_over(
     builder.build()
     whole = 1.0 + left_m / distance.sum() if distance.sum() > 0.0 else 1.0
     newest = builder.newest
-    return Flown(
+    return FlightOutcome(
         duration_s=seconds * whole,
         distances_m={member.name: float(distance[i]) * whole for i, member in enumerate(members)},
         coverage_pct=builder.coverage_pct(),

@@ -80,7 +80,7 @@ class WholeSurvey:
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlightOutcome:
     """What one flight came to. ``steps`` is less than asked for when the time was up; then the rest is drawn out.
 
     ``distances_m`` has every vehicle's way, ``remaining_pct`` the landmarks that are not known in the end.
@@ -95,7 +95,7 @@ class Flown:
     whole: WholeSurvey | None = None
     """Where swath sonars ensonify an area: all of it, whatever the budget."""
 
-    def with_whole(self, whole: WholeSurvey) -> "Flown":
+    def with_whole(self, whole: WholeSurvey) -> "FlightOutcome":
         """Return the outcome together with what the whole survey takes."""
         return replace(self, whole=whole)
 

@@ -15,12 +15,12 @@ from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
-from app.estimation.uncertainty import BeamGeometry, Uncertainty, uncertainty
+from app.estimation.uncertainty import BeamPaths, Uncertainty, uncertainty
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.decision import Knowledge, decide
 from app.missions.flight.legs.demand import LEAD_S, SOON
 from app.missions.forecast.floor import Floor
-from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
+from app.missions.forecast.swarm import FlightOutcome, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.constraints import limits_of_decisions, make_constraints
@@ -205,7 +205,7 @@ class SwathFlight:
             return
         east, north, depth, slant_m, down_m = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
         spec, noise_m = self._spec, np.maximum(self._spec.sounding_noise * slant_m, LEAST_SD_M)
-        went = BeamGeometry(np.arccos(np.clip(down_m / slant_m, 0.0, 1.0)), down_m, np.zeros_like(down_m))
+        went = BeamPaths(np.arccos(np.clip(down_m / slant_m, 0.0, 1.0)), down_m, np.zeros_like(down_m))
         sd = uncertainty(went, spec.uncertainty, np.full_like(down_m, craft.position_sd_m))
         # Each beam stands for those beside it that are left out, whose errors average.
         averaged = math.sqrt(min(craft.share * len(depth) / (len(poses) * craft.sonar.beams), 1.0))
@@ -254,7 +254,7 @@ def sweep_over(
     so_far: SoFar,
     budget_s: float,
     stop: Callable[[], bool] = lambda: False,
-) -> Flown:
+) -> FlightOutcome:
     """Fly a survey with swath sonars ahead over one floor: for its budget, then on until nothing is left to ensonify.
 
     After ``budget_s`` seconds of the processor the rest is drawn out from the share that was ensonified by then.
@@ -276,7 +276,7 @@ def sweep_over(
         # As far as it may go, unless all is seen before that.
         goes = float(swarm.distance_m.sum())
         whole = min(1.0 + float(left_m.sum()) / max(goes, 1.0), 100.0 / max(done_pct, 1.0))
-    flown = Flown(
+    flown = FlightOutcome(
         duration_s=max(float(clock[-1]) for clock in flight.clocks_s) * whole,
         distances_m={
             member.name: float(way_m) * whole for member, way_m in zip(members, flight.circled_m, strict=True)

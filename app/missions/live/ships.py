@@ -11,7 +11,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member, Team
-from app.missions.traffic.approach import PlannedWay, closest_approach, planned_way
+from app.missions.traffic.approach import TimedWay, closest_approach, planned_way
 from app.missions.traffic.ship_list import Ship
 from app.missions.traffic.watch import Traffic
 from app.missions.views.traffic import ApproachView, ShipView, TrafficMessage, own_ship_view, ship_view
@@ -159,7 +159,7 @@ class ShipsAbout:
             distance[of_it], in_s[of_it] = closest_approach(here[of_it], velocity[of_it], way, float(depth), within_s)
         return np.maximum(distance - np.array([s.hull_m for s in ships]), 0.0), in_s
 
-    def _way(self, member: Member) -> PlannedWay:
+    def _way(self, member: Member) -> TimedWay:
         """Return where a vehicle goes; one that holds below would come up where it is."""
         assert member.report is not None  # noqa: S101 - callers looked
         here, depth_m = member.place_m(self._frame), member.report.position.depth_m

@@ -106,7 +106,7 @@ class ProductOptions:
 
 
 @dataclass(frozen=True)
-class Surveyed:
+class SurveyTimes:
     """When a mission's soundings were made, and the largest deviation of a position that they state.
 
     All None without soundings, the last one also where some state none.
@@ -128,7 +128,7 @@ class Material:
     soundings: FileContent | None = None
     tracks: Sequence[Track] = ()
     search: Search | None = None
-    surveyed: Surveyed = Surveyed()
+    surveyed: SurveyTimes = SurveyTimes()
     crossovers: SurveyCheck | None = None
 
     @property

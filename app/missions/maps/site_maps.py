@@ -37,7 +37,7 @@ class SiteFacts:
 
 
 @dataclass(frozen=True)
-class Surveyed:
+class SiteSurvey:
     """A survey of a site: by which mission, and until when, Unix seconds."""
 
     mission_id: str
@@ -57,7 +57,7 @@ class SiteMap:
 
     facts: SiteFacts
     model: SiteModel
-    surveys: Sequence[Surveyed]
+    surveys: Sequence[SiteSurvey]
 
     @property
     def datum(self) -> VerticalDatum:
@@ -141,7 +141,7 @@ class SiteChange:
     change: Change
     earlier: Survey
     later: Survey
-    surveys: tuple[Surveyed, Surveyed]
+    surveys: tuple[SiteSurvey, SiteSurvey]
     left_out: tuple[str, ...] = ()
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
-from app.estimation.uncertainty import BeamGeometry, SoundingErrors, Uncertainty, uncertainty
+from app.estimation.uncertainty import BeamPaths, SoundingErrors, Uncertainty, uncertainty
 from app.exploration.core.coverage import Coverage
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map
@@ -45,7 +45,7 @@ def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -
         return None
     pings, beams = there.pings, there.footprints
     found = beams.take(states_of(there).used & np.isfinite(beams.depth_m))
-    went = BeamGeometry(
+    went = BeamPaths(
         angle_rad=found.angle_rad - pings.roll_rad[found.ping],
         down_m=np.abs(found.depth_m - pings.depth_m[found.ping]),
         pitch_rad=pings.pitch_rad[found.ping],

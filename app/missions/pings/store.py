@@ -350,7 +350,7 @@ class PingStore:
         except PingFileError as error:
             raise _unreadable(error) from None
 
-    async def contents(self) -> tuple[Sequence[PingChunkRow], Mapping[str, ping_queries.Waiting]]:
+    async def contents(self) -> tuple[Sequence[PingChunkRow], Mapping[str, ping_queries.WaitingPings]]:
         """Return the files, and by vehicle what is in none yet, without what was taken back."""
         async with self._database.reading() as session:
             return (

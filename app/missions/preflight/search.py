@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.exploration.site_search.ground import UNREACHED, Ground
+from app.exploration.site_search.ground import UNREACHED, SiteGround
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.search.course import FIRST_PACE
@@ -58,7 +58,7 @@ def search_checks(live: LiveMission) -> Iterator[CheckView]:
 def _ways(search: Search, spec: MissionSpec) -> CheckView:
     """Return whether vehicles can leave the entry and get to the goal area and back, by what is known of the site."""
     task = search.task(0.0)
-    ground = Ground.of(task)
+    ground = SiteGround.of(task)
     start = np.zeros_like(task.in_goal)
     row, col = ground.places(search.site.entry_m[None])[0]
     start[row, col] = True

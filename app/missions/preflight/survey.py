@@ -20,7 +20,7 @@ from app.missions.preflight.positions import position_checks
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks
-from app.missions.safety.free_space import WAITING_CIRCLE_M, way_in
+from app.missions.safety.room import WAITING_CIRCLE_M, way_in
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.task.constraints import INSET_M, arrival_room_m, from_outside, make_constraints

@@ -42,7 +42,7 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Points:
+class Statements:
     """A list of statements."""
 
     items: Sequence[Text]
@@ -99,7 +99,7 @@ class Listing:
     kind: str = "listing"
 
 
-Block = Paragraph | Points | Facts | Table | Figure | Listing
+Block = Paragraph | Statements | Facts | Table | Figure | Listing
 
 
 @dataclass(frozen=True)

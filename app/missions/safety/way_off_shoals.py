@@ -9,7 +9,7 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import TOLERANCE_M, WHERE, Constraints, inside_area
 from app.exploration.core.open_ground import OpenGround
-from app.missions.safety import free_space
+from app.missions.safety import room
 
 SECTORS, OF_SECTOR = 72, 6
 """Of the places that are deep enough the nearest are looked at, so many in each of so many directions."""
@@ -113,7 +113,7 @@ def _is_free(
     here, there = np.append(place_m, 0.0)[None], np.append(end_m, 0.0)[None]
     if any(broken.limit in WHERE for broken in constraints.violations(("",), here, there)):
         return False
-    if free_space.barred(constraints, place_m, end_m, room_m):
+    if room.barred(constraints, place_m, end_m, room_m):
         return False
     way = LineString([place_m, end_m])
     apart_m = [min(constraints.min_separation_m, float(np.hypot(*(other[:2] - place_m)))) for other in taken]

@@ -15,7 +15,7 @@ from shapely.ops import nearest_points
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.missions.safety import free_space
+from app.missions.safety import room
 
 SMALLER = (1.0, 0.5, 0.25)
 """Parts of the room that are tried where all of it would close a way."""
@@ -44,7 +44,7 @@ def room_around(area: FloatArray, zones: Sequence[FloatArray], room_m: float) ->
     parts, left, around = _parts(ground), ground, []
     for zone in zones:
         for part in SMALLER:
-            wide = free_space.widened(zone, part * room_m)
+            wide = room.widened(zone, part * room_m)
             tried = left.difference(Polygon(wide))
             if _hold_together(parts, tried):
                 around.append(wide)

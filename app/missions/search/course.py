@@ -7,7 +7,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.site_search import SearchTask
-from app.exploration.site_search.ground import Ground
+from app.exploration.site_search.ground import SiteGround
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec
@@ -146,7 +146,7 @@ def hold_before_hazards(
 
     Planners keep off by themselves; this is the check that does not trust them.
     """
-    ground, checked, notes = Ground.for_legs(replace(task, spare_m=0.0)), proposed.copy(), []
+    ground, checked, notes = SiteGround.for_legs(replace(task, spare_m=0.0)), proposed.copy(), []
     for i, name in enumerate(names):
         still = np.hypot(*(proposed[i, :2] - origin[i, :2])) <= 0.0
         if not still and np.isfinite(proposed[i]).all() and not ground.clear(origin[i, :2], proposed[i : i + 1, :2])[0]:

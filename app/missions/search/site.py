@@ -12,7 +12,7 @@ from app.arrays import BoolArray, FloatArray
 from app.estimation.occupancy import OccupancyGrid, Scanner
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.coordinates.outlines import touched
-from app.missions.safety.free_space import widened
+from app.missions.safety.room import widened
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.search import SearchSpec
 from simulator.obstacles.obstacles import ObstacleWorld

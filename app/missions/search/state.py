@@ -11,7 +11,7 @@ from app.arrays import FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.criteria import in_contact
-from app.exploration.site_search.ground import Ground
+from app.exploration.site_search.ground import SiteGround
 from app.exploration.site_search.scene import HOME_STEPS
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
@@ -61,8 +61,8 @@ class Search:
         self._time_scale = time_scale
         self._grid = self.site.grid
         self._figures: Figures | None = None
-        self._ground: Ground | None = None
-        self._ways: Ground | None = None
+        self._ground: SiteGround | None = None
+        self._ways: SiteGround | None = None
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -151,7 +151,7 @@ class Search:
     def clear(self, origin_m: FloatArray, end_m: FloatArray) -> bool:
         """Return whether a straight leg between places (2,) keeps the safety distance from every hazard known now."""
         if self._ground is None:
-            self._ground = Ground.for_legs(self.task(0.0))
+            self._ground = SiteGround.for_legs(self.task(0.0))
         return bool(self._ground.clear(origin_m, end_m[None])[0])
 
     def way_m(
@@ -166,13 +166,13 @@ class Search:
         """
         if not len(off_m):
             return self._way_m(lambda ground: ground.way(here_m, end_m))
-        ways = (Ground.of(self._task_of_ways(np.array(off_m), apart_m, spare_m)) for spare_m in (self.spare_m, 0.0))
+        ways = (SiteGround.of(self._task_of_ways(np.array(off_m), apart_m, spare_m)) for spare_m in (self.spare_m, 0.0))
         return next((way for ground in ways if (way := ground.way(here_m, end_m)) is not None), None)
 
-    def _way_m(self, found: Callable[[Ground], FloatArray | None]) -> FloatArray | None:
+    def _way_m(self, found: Callable[[SiteGround], FloatArray | None]) -> FloatArray | None:
         """Return a way that keeps what is spared beside the safety distance, or where none does one that does not."""
         way_m = found(self._seen_ground)
-        return found(Ground.of(self.task(0.0))) if way_m is None and self.spare_m > 0.0 else way_m
+        return found(SiteGround.of(self.task(0.0))) if way_m is None and self.spare_m > 0.0 else way_m
 
     def way_towards_m(self, here_m: FloatArray, end_m: FloatArray) -> FloatArray | None:
         """Return the corners (n, 2) of a way to a place (2,), or as near to it as ways lead by what is known now.
@@ -184,7 +184,7 @@ class Search:
 
     def gets_away(self, en_m: FloatArray) -> bool:
         """Return whether a vehicle at a place (2,) gets a step away from there, by ways that are known now."""
-        grounds = (self._seen_ground, Ground.of(self.task(0.0)))
+        grounds = (self._seen_ground, SiteGround.of(self.task(0.0)))
         return any(ground.reaches_m(en_m) >= self._step_m for ground in grounds)
 
     @property
@@ -203,9 +203,9 @@ class Search:
         return replace(self.task(0.0, spare_m=spare_m), standing_m=off_m, apart_m=apart_m)
 
     @property
-    def _seen_ground(self) -> Ground:
+    def _seen_ground(self) -> SiteGround:
         if self._ways is None:
-            self._ways = Ground.of(self.task(0.0, spare_m=self.spare_m))
+            self._ways = SiteGround.of(self.task(0.0, spare_m=self.spare_m))
         return self._ways
 
     @property

@@ -8,7 +8,7 @@ from shapely.geometry import Polygon
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.planner.base import PlannerBase
-from app.missions.safety import free_space, travel_depth
+from app.missions.safety import room, travel_depth
 from app.missions.safety.zone_clearance import room_around
 from app.missions.spec.mission import MissionSpec
 
@@ -26,7 +26,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     """Return a mission's limits in its local frame."""
     limits = spec.limits
     zones = [spec.to_local(zone) for zone in spec.keep_out]
-    margins = [free_space.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
+    margins = [room.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     area = spec.local_inner_area()
     # A search keeps off everything by more than a vehicle's arrival radius.
     room_m = arrival_room_m(spec) if spec.search is None else 0.0
@@ -63,4 +63,4 @@ def arrival_room_m(spec: MissionSpec) -> float:
 
 def from_outside(place_m: FloatArray, area: Polygon, spec: MissionSpec) -> bool:
     """Return whether a vehicle is so far outside the area, without its margin, that it is sent to its border first."""
-    return free_space.distance_outside_m(area, place_m) > NEARBY_OUTSIDE_M + spec.limits.border_margin_m
+    return room.distance_outside_m(area, place_m) > NEARBY_OUTSIDE_M + spec.limits.border_margin_m

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import shapely
 from shapely import LineString
 
-from app.exploration.core.routes import free_region
+from app.exploration.core.free_space import free_region
 from app.exploration.lines.given_lines import GivenLine
 from app.exploration.lines.lawnmower import BORDER_MARGIN_M
 from app.missions.spec.mission import MissionSpec

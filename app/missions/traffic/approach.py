@@ -13,7 +13,7 @@ DIVE_S = 60.0
 
 
 @dataclass(frozen=True)
-class PlannedWay:
+class TimedWay:
     """Where a vehicle will be when: straight on between corners, at rest after the last.
 
     Attributes
@@ -32,7 +32,7 @@ class PlannedWay:
 
 def planned_way(
     place_m: FloatArray, depth_m: float, ends: Sequence[tuple[FloatArray, float]], speed_mps: float
-) -> PlannedWay:
+) -> TimedWay:
     """Return the way of a vehicle that goes from where it is through ``ends``, each a place (2,) and a depth (m).
 
     Without a speed it stays where it is, and counts as at the least of these depths.
@@ -40,14 +40,14 @@ def planned_way(
     places = np.array([place_m, *(end for end, _ in ends)], dtype=np.float64)
     depths = np.array([depth_m, *(deep for _, deep in ends)], dtype=np.float64)
     if speed_mps <= 0.0:
-        return PlannedWay(np.zeros(1), places[:1], np.array([depths.min()]))
+        return TimedWay(np.zeros(1), places[:1], np.array([depths.min()]))
     away = np.diff(np.column_stack([places, depths]), axis=0)
     taken = np.linalg.norm(away, axis=1) / speed_mps
-    return PlannedWay(np.concatenate([[0.0], np.cumsum(taken)]), places, depths)
+    return TimedWay(np.concatenate([[0.0], np.cumsum(taken)]), places, depths)
 
 
 def closest_approach(
-    ships_m: FloatArray, velocities_mps: FloatArray, way: PlannedWay, least_depth_m: float, within_s: float
+    ships_m: FloatArray, velocities_mps: FloatArray, way: TimedWay, least_depth_m: float, within_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return how close ships come within a time to a vehicle while that is shallower than a depth, and when.
 
@@ -83,7 +83,7 @@ def closest_approach(
     return distance_m, in_s
 
 
-def _shallow_times(way: PlannedWay, least_depth_m: float, within_s: float) -> Iterator[tuple[float, float]]:
+def _shallow_times(way: TimedWay, least_depth_m: float, within_s: float) -> Iterator[tuple[float, float]]:
     """Yield from when to when a vehicle counts as shallow, one after the other."""
     ends = [*way.time_s[1:].tolist(), math.inf]
     last = len(way.time_s) - 1

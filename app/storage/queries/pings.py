@@ -26,7 +26,7 @@ class Totals:
 
 
 @dataclass(frozen=True)
-class Waiting(Totals):
+class WaitingPings(Totals):
     """Pings of a vehicle that are in no file yet."""
 
     blocks: int = 0
@@ -100,7 +100,7 @@ async def period(
     return (min(ends), max(ends)) if ends else None
 
 
-async def waiting(session: AsyncSession, mission_id: str, *, without: Collection[int] = ()) -> dict[str, Waiting]:
+async def waiting(session: AsyncSession, mission_id: str, *, without: Collection[int] = ()) -> dict[str, WaitingPings]:
     """Return by vehicle what is in no file yet, ``without`` what some logs brought."""
     table = PingBlockRow
     query = select(
@@ -115,7 +115,7 @@ async def waiting(session: AsyncSession, mission_id: str, *, without: Collection
     of_mission = (table.mission_id == mission_id, _not_of(table, without))
     found = await session.execute(query.where(*of_mission).group_by(table.vehicle))
     return {
-        vehicle: Waiting(int(pings), int(beams), int(rejected), blocks, first_s, last_s)
+        vehicle: WaitingPings(int(pings), int(beams), int(rejected), blocks, first_s, last_s)
         for vehicle, pings, beams, rejected, blocks, first_s, last_s in found
     }
 

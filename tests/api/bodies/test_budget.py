@@ -4,13 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.api.bodies.budget import Budget
+from app.api.bodies.budget import BodyBudget
 from app.api.http.problems import ProblemError
 
 
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(1, 60)), max_size=40), st.integers(20, 100))
 def test_what_is_held_never_exceeds_the_whole_nor_one_the_share(asked: list[tuple[str, int]], total: int) -> None:
-    budget = Budget(total)
+    budget = BodyBudget(total)
     held = dict.fromkeys("abc", 0)
     for client, count in asked:
         first = held[client] == 0
@@ -26,7 +26,7 @@ def test_what_is_held_never_exceeds_the_whole_nor_one_the_share(asked: list[tupl
 
 
 def test_room_is_given_back_however_a_request_ends() -> None:
-    budget = Budget(100)
+    budget = BodyBudget(100)
     with budget.lease("a") as lease:
         for count, held in ((30, 30), (20, 30), (40, 40)):
             lease.cover(count)
@@ -38,7 +38,7 @@ def test_room_is_given_back_however_a_request_ends() -> None:
 
 
 def test_the_second_request_of_one_client_leaves_room_for_others() -> None:
-    budget = Budget(100)
+    budget = BodyBudget(100)
     with budget.lease("a") as one, budget.lease("a") as two, budget.lease("b") as other:
         one.cover(45)
         with pytest.raises(ProblemError) as refused:

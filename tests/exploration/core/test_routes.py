@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import dijkstra
 from shapely.geometry import LineString, Polygon
 
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.geometry import enters
-from app.exploration.core.routes import FreeSpace
 
 AREA = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 80.0], [60.0, 80.0], [60.0, 60.0], [40.0, 60.0], [0.0, 80.0]])
 ZONES = (

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace, Turns, Vehicles, flown_m
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, Vehicles, flown_m
 from app.exploration.lines.even_survey import EvenSurvey, Pattern, even_survey, fullest_surveys
 from app.exploration.lines.lattice import Sweep
 from app.exploration.lines.lawnmower import lawnmower_routes

@@ -11,8 +11,9 @@ from shapely import LineString, Polygon
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.problem import Belief, Situation
-from app.exploration.core.routes import FreeSpace, Turns, Vehicles
+from app.exploration.core.routes import Turns, Vehicles
 from app.exploration.lines.given_lines import GivenLine, GivenSurvey, LinePlan, given_survey
 from app.exploration.lines.lattice import flown_length
 from app.exploration.lines.lawnmower import LawnmowerPlanner

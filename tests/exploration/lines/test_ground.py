@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace, Turns, flown_m
+from app.exploration.core.free_space import FreeSpace
+from app.exploration.core.routes import Turns, flown_m
 from app.exploration.lines.ground import Ground
 
 SIDE = 100.0

@@ -13,9 +13,9 @@ from shapely import LineString, Point, Polygon
 from app.estimation import SingleBeam
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.open_ground import OpenGround
 from app.exploration.core.problem import Situation
-from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planner.ordered import OrderedPlanner
 from app.exploration.planners import create_planner

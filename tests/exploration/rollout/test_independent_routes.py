@@ -16,9 +16,9 @@ from app.exploration.core.moving_targets import Targets
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
+from app.exploration.rollout.allowed_raster import allowed_raster
 from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import FloorEstimate, estimate_floor, held_to, hold_to, let_stay, sample
-from app.exploration.rollout.free_space import free_space
 from app.exploration.rollout.independent_mission import apart_mission
 from app.exploration.rollout.independent_routes import (
     RoutesFlown,
@@ -168,7 +168,7 @@ def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed: in
 def test_the_search_never_worsens_routes_and_reports_their_true_score(seed: int, zones: Any) -> None:
     _, points, floor, routes = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
-    free = free_space(Constraints(CUBE, (zone,) if zones else ()))
+    free = allowed_raster(Constraints(CUBE, (zone,) if zones else ()))
     before, paths, left = flown(routes, points, floor)
     draws = np.random.default_rng(seed).random((60, DRAWS + 1))
     best = RoutesFlown(routes, paths, left)
@@ -265,7 +265,7 @@ def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(s
     team = replace(situation(1, START), belief=hilly(seed))
     bottom = Bottom.from_landmarks(team.belief.xy_m, team.belief.depth_m)
     mission = apart_mission(
-        team, FREE, bottom, np.zeros((0, 3)), free_space(LIMITS), RangeSensor(0.4),
+        team, FREE, bottom, np.zeros((0, 3)), allowed_raster(LIMITS), RangeSensor(0.4),
         PlannerOptions(accuracy_sd_m=ACCURACY), np.random.default_rng(seed),
     )  # fmt: skip
     best = mission.plan(list(np.random.default_rng(seed).uniform(-0.9, 0.9, (3, 4, 2))))

@@ -11,6 +11,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief
+from app.exploration.rollout.allowed_raster import allowed_raster, clear_ways, settle_waypoint
 from app.exploration.rollout.flight import (
     DIVE,
     FlownPlan,
@@ -25,7 +26,6 @@ from app.exploration.rollout.flight import (
     new_checkpoints,
 )
 from app.exploration.rollout.floor import ENVELOPE_SLOPE, deepest_dive_m, estimate_floor, sample
-from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
 from app.exploration.rollout.tour import shortest_order, tour_of
@@ -171,7 +171,7 @@ def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed: int) -> N
 def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: int, zones: Any) -> None:
     start, plan, count, work, floor = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
-    free = free_space(Constraints(CUBE, (zone,) if zones else ()))
+    free = allowed_raster(Constraints(CUBE, (zone,) if zones else ()))
     before, left, checkpoints = flown(start, plan, count, work, floor)
     trial, scratch = copied(plan), new_checkpoints(ROOM, len(start), len(work.need))
     draws = np.random.default_rng(seed).random((150, DRAWS))
@@ -191,7 +191,7 @@ def test_ways_lead_round_zones_with_the_team_together(seed: int) -> None:
     high = low + rng.uniform(0.2, 0.4, 2)
     zone = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     constraints = Constraints(CUBE, (zone,))
-    free = free_space(constraints)
+    free = allowed_raster(constraints)
     start = np.array([[-0.9, -0.9], [-0.9, -0.7], [-0.9, -0.5]])
     plan = Plan(np.zeros((ROOM, 3, 2)), np.zeros(ROOM), np.zeros(ROOM), np.arange(3))
     plan.at_m[0] = [[0.9, 0.5], [0.9, 0.7], [0.9, 0.9]]

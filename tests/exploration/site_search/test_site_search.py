@@ -18,7 +18,7 @@ from app.exploration.planners import SEARCHERS, create_planner
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.criteria import Standstill, Supervisor, Weights, in_contact, nearness, terms
 from app.exploration.site_search.gains import Gains, gains, take
-from app.exploration.site_search.ground import STRAIGHT, UNREACHED, Ground
+from app.exploration.site_search.ground import STRAIGHT, UNREACHED, SiteGround
 from simulator.obstacles.obstacles import ObstacleWorld
 
 SIDE = 40
@@ -71,7 +71,7 @@ def explored(seed: int, looks: int = 6) -> tuple[ObstacleWorld, SearchTask]:
 @settings(max_examples=5, deadline=None)
 def test_distances_are_those_of_dijkstra(seed: int) -> None:
     _, task = explored(seed)
-    ground = Ground.of(task)
+    ground = SiteGround.of(task)
     ok = ground.passable
     index = np.arange(ok.size).reshape(ok.shape)
     rows, cols, costs = [], [], []
@@ -94,7 +94,7 @@ def test_distances_are_those_of_dijkstra(seed: int) -> None:
 @settings(max_examples=10, deadline=None)
 def test_clear_legs_and_ways_home_keep_the_safety_distance(seed: int) -> None:
     world, task = explored(seed)
-    ground, rng = Ground.of(task), np.random.default_rng([seed, 2])
+    ground, rng = SiteGround.of(task), np.random.default_rng([seed, 2])
     ends = rng.uniform(0.0, SIDE, (200, 2))
     for end in ends[ground.clear(CORNER, ends)]:
         leg = CORNER + np.linspace(0.0, 1.0, 400)[:, None] * (end - CORNER)
@@ -146,7 +146,7 @@ def test_gains_that_are_kept_are_those_worked_out_anew(seed: int) -> None:
 @settings(max_examples=5, deadline=None)
 def test_distances_that_end_at_some_cells_are_right_up_to_there(seed: int) -> None:
     _, task = explored(seed)
-    ground, rng = Ground.of(task), np.random.default_rng([seed, 5])
+    ground, rng = SiteGround.of(task), np.random.default_rng([seed, 5])
     start, until = CORNER[None].astype(np.int64), rng.integers(0, SIDE, (3, 2))
     whole, part = ground.distances(start), ground.distances(start, until)
     up_to = whole[tuple(until.T)].max()
@@ -261,7 +261,7 @@ def test_vehicles_that_stand_are_gone_round(name: str, seed: int) -> None:
 
 def test_who_stands_too_near_to_another_may_get_away_from_it() -> None:
     _, task = explored(3)
-    ground = Ground.of(replace(task, standing_m=np.array([[5.5, 4.5]]), apart_m=4.0))
+    ground = SiteGround.of(replace(task, standing_m=np.array([[5.5, 4.5]]), apart_m=4.0))
     ends = np.array([[3.5, 4.5], [6.5, 4.5], [4.5, 5.5]])
     np.testing.assert_array_equal(ground.clear(CORNER, ends), [True, False, True])
 

@@ -8,7 +8,7 @@ import numpy as np
 from app.estimation.swath import SwathSonar
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.swath.near_zones import BarredGround, led_round
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey

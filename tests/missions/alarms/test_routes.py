@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.missions.alarm_settings import AlarmSettings
-from app.missions.alarms.routes import Step, delivery_id, due, steps
+from app.missions.alarms.routes import EscalationStep, delivery_id, due, steps
 from app.missions.views.alarms import Notice
 
 SECRET = "sixteen bytes or more"  # noqa: S105 - the test's own
@@ -16,7 +16,7 @@ def settings(*routes: dict[str, object]) -> AlarmSettings:
     return AlarmSettings.model_validate({"webhooks": hooks, "routes": routes})
 
 
-def told(found: AlarmSettings, kind: AlarmKind, severity: AlarmSeverity, name: str = "Harbour") -> list[Step]:
+def told(found: AlarmSettings, kind: AlarmKind, severity: AlarmSeverity, name: str = "Harbour") -> list[EscalationStep]:
     return steps(found, kind, severity, "id-1", name)
 
 
@@ -26,12 +26,16 @@ def test_routes_choose_by_severity_kind_and_mission() -> None:
         {"to": ["b"], "kinds": ["leak", "test"], "after_s": 60},
         {"to": ["c", "a"], "missions": ["Harb*"], "after_s": 5},
     )
-    assert told(found, AlarmKind.LEAK, AlarmSeverity.CRITICAL) == [Step("a", 0), Step("c", 5), Step("b", 60)]
-    assert told(found, AlarmKind.VEHICLE_LOST, AlarmSeverity.MAJOR) == [Step("c", 5), Step("a", 5)]
+    assert told(found, AlarmKind.LEAK, AlarmSeverity.CRITICAL) == [
+        EscalationStep("a", 0),
+        EscalationStep("c", 5),
+        EscalationStep("b", 60),
+    ]
+    assert told(found, AlarmKind.VEHICLE_LOST, AlarmSeverity.MAJOR) == [EscalationStep("c", 5), EscalationStep("a", 5)]
     assert told(found, AlarmKind.VEHICLE_LOST, AlarmSeverity.MAJOR, "Bay") == []
-    assert steps(found, AlarmKind.TEST, AlarmSeverity.MINOR, None, "") == [Step("b", 60)]
+    assert steps(found, AlarmKind.TEST, AlarmSeverity.MINOR, None, "") == [EscalationStep("b", 60)]
     assert steps(settings({"to": ["a"], "missions": ["id-?"]}), AlarmKind.LEAK, AlarmSeverity.MAJOR, "id-1", "") == [
-        Step("a", 0)
+        EscalationStep("a", 0)
     ]
 
 
@@ -40,7 +44,7 @@ def test_routes_choose_by_severity_kind_and_mission() -> None:
     looks=st.lists(st.floats(0, 1000), min_size=1, max_size=12).map(sorted),
 )
 def test_everybody_is_told_once_in_time_however_often_is_looked(after: list[float], looks: list[float]) -> None:
-    ladder = sorted((Step(str(k), s) for k, s in enumerate(after)), key=lambda step: step.after_s)
+    ladder = sorted((EscalationStep(str(k), s) for k, s in enumerate(after)), key=lambda step: step.after_s)
     told_s, found = None, []
     for age_s in looks:
         now, next_s = due(ladder, told_s, age_s)

@@ -25,7 +25,7 @@ from app.missions.flight.runner import nearest_leg
 from app.missions.flight.survey_end import NOT_WAITED_FOR
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
-from app.missions.safety import free_space
+from app.missions.safety import room
 from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.missions.team import Member
@@ -373,7 +373,7 @@ async def test_who_has_flown_everything_circles_inside_the_area(
     assert flown.held["fast"]
     for place in flown.held["fast"]:
         east, north = spec.frame().to_local(np.array(place.lat_deg), np.array(place.lon_deg))
-        assert Polygon(spec.local_area()).buffer(-free_space.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
+        assert Polygon(spec.local_area()).buffer(-room.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
 
 
 @given(st.integers(0, 10_000))

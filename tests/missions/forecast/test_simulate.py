@@ -14,7 +14,7 @@ from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
 from app.missions.forecast.simulate import Forecast, fly, fly_over, forecast
-from app.missions.forecast.swarm import Flown, SoFar, Swarm, planner_of
+from app.missions.forecast.swarm import FlightOutcome, SoFar, Swarm, planner_of
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
@@ -146,7 +146,9 @@ def test_ranges_span_what_came_over_the_floors() -> None:
     spec = lines()
     floors = list(floors_of(spec, NONE, 4.0, None))
     flights = [
-        Flown(100.0 + 10.0 * k, {"a": 50.0 + k, "b": 40.0}, 10.0 * k, 100.0 - 10.0 * k, 0.1 * k if k else None, 8)
+        FlightOutcome(
+            100.0 + 10.0 * k, {"a": 50.0 + k, "b": 40.0}, 10.0 * k, 100.0 - 10.0 * k, 0.1 * k if k else None, 8
+        )
         for k in range(len(floors))
     ]
     view = request._view(spec, Forecast(flights, floors), "", 8)

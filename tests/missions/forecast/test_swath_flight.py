@@ -13,7 +13,7 @@ from app.missions.flight.steering import steered
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.request import _view, _whole, starts_of
 from app.missions.forecast.simulate import Forecast, fly_over
-from app.missions.forecast.swarm import Flown, SoFar, circle_m
+from app.missions.forecast.swarm import FlightOutcome, SoFar, circle_m
 from app.missions.forecast.swath_flight import swath_of, sweeps
 from app.missions.forecast.whole_survey import batteries
 from app.missions.recovery.failsafes import with_reserve_s
@@ -39,7 +39,7 @@ def level(depth_m: float, side_m: float) -> Floor:
     return Floor(Terrain(np.full((cells, cells), depth_m), 5.0, name="level"), "level", "level", 0.0)
 
 
-def flown(spec: MissionSpec, floor: Floor, prior: np.ndarray = NONE, budget_s: float = AMPLE_S) -> Flown:
+def flown(spec: MissionSpec, floor: Floor, prior: np.ndarray = NONE, budget_s: float = AMPLE_S) -> FlightOutcome:
     team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     return fly_over(floor, spec, members, starts_of(spec, members)[0], SoFar(prior=prior), budget_s)

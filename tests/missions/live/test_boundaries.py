@@ -9,7 +9,7 @@ from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.live.boundaries import Boundaries
 from app.missions.operations.history import events_after
 from app.missions.preflight.survey import preflight
-from app.missions.safety.free_space import WAITING_CIRCLE_M
+from app.missions.safety.room import WAITING_CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.vehicle import Sensor, VehicleKind

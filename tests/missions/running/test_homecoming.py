@@ -16,7 +16,7 @@ from app.missions.flown import Phase
 from app.missions.operations.history import events_after
 from app.missions.recovery.berths import home_of
 from app.missions.running.homecoming import call_home, hold
-from app.missions.safety.free_space import CIRCLE_M
+from app.missions.safety.room import CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.missions.traffic.approach import DIVE_S, PlannedWay, closest_approach, planned_way
+from app.missions.traffic.approach import DIVE_S, TimedWay, closest_approach, planned_way
 
 WITHIN_S = 120.0
 STEP_S = 0.1
@@ -15,7 +15,7 @@ speeds = st.floats(-12.0, 12.0)
 corners = st.lists(st.tuples(metres, metres, st.sampled_from([0.0, 2.0, 12.0])), min_size=1, max_size=4)
 
 
-def sampled(ship: np.ndarray, velocity: np.ndarray, way: PlannedWay, least_m: float) -> float:
+def sampled(ship: np.ndarray, velocity: np.ndarray, way: TimedWay, least_m: float) -> float:
     """Return the least distance at sampled times at which the vehicle counts as shallow."""
     best = np.inf
     for now_s in np.arange(0.0, WITHIN_S + 0.5 * STEP_S, STEP_S):

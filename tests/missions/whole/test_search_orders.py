@@ -5,7 +5,7 @@ import pytest
 from shapely.geometry import LineString, Point, box
 
 from app.arrays import FloatArray
-from app.exploration.site_search.ground import Ground
+from app.exploration.site_search.ground import SiteGround
 from app.missions.fleet.interface import ScanReport, WaypointStatus
 from app.missions.fleet.links.sim import AGROUND
 from app.missions.flight.search_hooks import SearchHooks
@@ -230,7 +230,7 @@ def test_every_leg_of_a_way_keeps_the_safety_distance_from_all_that_is_not_known
     for east, north in rng.uniform(6.0, 24.0, (6, 2)):
         search.see([_all_round(east, north)])
     task = search.task(0.0)
-    hazards = [box(col, row, col + 1, row + 1) for row, col in np.argwhere(Ground.for_legs(task).hazard)]
+    hazards = [box(col, row, col + 1, row + 1) for row, col in np.argwhere(SiteGround.for_legs(task).hazard)]
     found = 0
     for here_m, end_m in zip(rng.uniform(6.0, 24.0, (20, 2)), rng.uniform(6.0, 24.0, (20, 2)), strict=True):
         if min(hazard.distance(Point(here_m)) for hazard in hazards) < 1.6:

@@ -21,9 +21,9 @@ from app.exploration.cao.regressors.missed import MissedLandmarks
 from app.exploration.cao.regressors.moves import team_moves
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.information_need import Lacking, lacking
 from app.exploration.core.problem import Situation
-from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.measured import MeasuredObjective
 from app.exploration.planner.options import PlannerOptions
 

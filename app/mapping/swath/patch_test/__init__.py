@@ -7,8 +7,8 @@ finds the mounting with which they agree on it.
 from app.mapping.swath.patch_test.beams import PatchBeams, with_only
 from app.mapping.swath.patch_test.evaluation import (
     PARAMETERS,
-    Agreement,
     Known,
+    LineAgreement,
     MountingEstimate,
     NoOverlapError,
     NotWantedError,
@@ -22,7 +22,7 @@ from app.mapping.swath.patch_test.solution import LineErrors
 
 __all__ = [
     "PARAMETERS",
-    "Agreement",
+    "LineAgreement",
     "ChosenGround",
     "Known",
     "LineErrors",

@@ -93,7 +93,7 @@ class ParameterEstimate:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class LineAgreement:
     """How well lines agree: RMS of their depths in cells beside the cells' means, metres.
 
     ``significance``: by how many of its standard deviations the mean square became smaller.
@@ -122,7 +122,7 @@ class MountingEstimate:
 
     parameters: dict[str, ParameterEstimate]
     proposal: Mounting | None
-    agreement: Agreement
+    agreement: LineAgreement
     cells: int
     lines: tuple[int, ...]
     beams: int
@@ -333,9 +333,9 @@ def _significance(block: IntArray, before_m2: FloatArray, other: IntArray, after
     return float(gain.mean() * np.sqrt(len(gain)) / max(float(gain.std(ddof=1)), 1e-12))
 
 
-def _agreement(before: "_Spread", after: "_Spread") -> Agreement:
+def _agreement(before: "_Spread", after: "_Spread") -> LineAgreement:
     significance = _significance(before.block, before.whole_m2, after.block, after.whole_m2)
-    return Agreement(before.rms_m, after.rms_m, significance)
+    return LineAgreement(before.rms_m, after.rms_m, significance)
 
 
 @dataclass(frozen=True)

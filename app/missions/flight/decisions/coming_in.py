@@ -9,7 +9,7 @@ from shapely.geometry import Point, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.missions.flight.decisions.leg import Leg, Place
-from app.missions.safety import free_space
+from app.missions.safety import room
 from app.missions.safety.zone_clearance import clear_of_zones
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.constraints import INSET_M, arrival_room_m, from_outside
@@ -28,12 +28,12 @@ def planned_for(
     team: list[Place] = []
     legs: list[Leg] = []
     for place in places:
-        outside_m = free_space.distance_outside_m(polygon, place.en_m)
-        border = free_space.nearest_inside(polygon, place.en_m)
+        outside_m = room.distance_outside_m(polygon, place.en_m)
+        border = room.nearest_inside(polygon, place.en_m)
         # No leg may end in a zone's margin: who is beyond one at the border is planned for from beside it.
         begins = clear_of_zones(constraints, border) if outside_m > 0.0 else place.en_m
         # Who is beyond a zone at the border is not planned for as if it were there.
-        cut_off = outside_m > arrival_room_m(spec) and free_space.barred(constraints, place.en_m, border)
+        cut_off = outside_m > arrival_room_m(spec) and room.barred(constraints, place.en_m, border)
         if outside_m > 0.0 and not np.array_equal(begins, border):
             cut_off |= math.dist(place.en_m, begins) > constraints.max_step_m
         far = cut_off or from_outside(place.en_m, polygon, spec)
@@ -63,7 +63,7 @@ def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray], ro
 
     Where no straight way leads there it is sent to the first corner of a way round zones, ``room_m`` from them.
     """
-    goal = free_space.way_in(constraints, place.en_m, INSET_M, taken, room_m)
+    goal = room.way_in(constraints, place.en_m, INSET_M, taken, room_m)
     if goal is None:
         return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every way in")
     # The bottom on the way is unknown: it comes at the surface.

@@ -12,7 +12,7 @@ from app.missions.flight.decisions.decision import Decision
 from app.missions.flight.steering import steered_motion
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.energy import ASCENT_MPS
-from app.missions.safety import free_space
+from app.missions.safety import room
 from app.missions.spec.limits import Limits
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.planner import turn_radius_m
@@ -89,7 +89,7 @@ def passes_above(member: Member, live: LiveMission, spec: MissionSpec) -> str:
         if other.report.position.depth_m > depth_m - limits.min_vertical_separation_m:
             continue
         nearest = closest_approach(rise, planned_motion(other, live), until_s=float(rise.time_s[-1]))
-        if nearest.distance_m < limits.min_separation_m + free_space.CIRCLE_M:
+        if nearest.distance_m < limits.min_separation_m + room.CIRCLE_M:
             return other.name
     return ""
 
@@ -111,7 +111,7 @@ def ways_aside(
         Have a vehicle that cannot get there in one leg come nearer to where it may be.
     """
     reach_m = constraints.max_step_m * (1 - 1e-9)
-    around = free_space.places_around(start[:2], reach_m)
+    around = room.places_around(start[:2], reach_m)
     ends = np.column_stack([around, np.full(len(around), start[2])])
     beyond_m = constraints.excess(start[None], ends[:, None], bottom)[:, 0, LIMITS_OF_PLACES]
     begins_m = constraints.excess(start[None], start[None, None], bottom)[0, 0, LIMITS_OF_PLACES]

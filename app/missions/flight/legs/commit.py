@@ -21,7 +21,7 @@ from app.missions.live.journals.journal import RISES
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
-from app.missions.safety import free_space, travel_depth
+from app.missions.safety import room, travel_depth
 from app.missions.safety.tide_and_bottom import FallingTide
 from app.missions.spec.vehicle import Guidance
 from app.missions.task.planner import turn_radius_m
@@ -196,7 +196,7 @@ class LegCommit:
         # It may be elsewhere than the leg was decided from.
         # The corner of a way in round a zone may lie farther outside than its vehicle does.
         area = Polygon(constraints.area)
-        goes_round = all(free_space.distance_outside_m(area, place_m[0, :2]) > 0.0 for place_m in (here, there))
+        goes_round = all(room.distance_outside_m(area, place_m[0, :2]) > 0.0 for place_m in (here, there))
         limits = [limit for limit in WHERE if not (goes_round and limit is Limit.AREA)]
         broken = constraints.violations((member.name,), here, there)
         return next((violation.reason for violation in broken if violation.limit in limits), "")
@@ -217,9 +217,9 @@ class LegCommit:
         last = member.withdrawal is not None and all(np.array_equal(one.target_m, target) for one in member.ahead)
         if member.report is not None and self._leads and not last:
             start = member.place_m(self._live.frame)
-            beyond = free_space.lead_point(self._constraints, start, target, LEAD_M)
+            beyond = room.lead_point(self._constraints, start, target, LEAD_M)
             on = target + np.linspace(0.0, 1.0, LEAD_SAMPLES)[:, None] * (beyond - target)
-            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, free_space.CIRCLE_M)])
+            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, room.CIRCLE_M)])
             lead = self._position(beyond[0], beyond[1], depth_m)
             known = travel_depth.bottom_on_way(np.array([start, target, beyond]), self.bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
@@ -255,11 +255,11 @@ class LegCommit:
             return None
         if self._live.search is not None:
             return self.waiting_at(member, member.place_m(self._live.frame))
-        inside = free_space.nearest_inside(Polygon(self._constraints.area), member.place_m(self._live.frame))
+        inside = room.nearest_inside(Polygon(self._constraints.area), member.place_m(self._live.frame))
         centre_m = self._room(member, inside, inside)
         if centre_m is None:
             return None
-        ways = [*self._turning(member, inside, centre_m), disc(centre_m, free_space.CIRCLE_M)]
+        ways = [*self._turning(member, inside, centre_m), disc(centre_m, room.CIRCLE_M)]
         order = self._present_order(member, member.report.position)
         wanted_m = order.position.depth_m
         if member.withdrawal is not None and member.withdrawal.below:
@@ -338,9 +338,9 @@ class LegCommit:
             way += [] if other.target_m is None else [other.target_m]
             way += [leg.target_m for leg in other.ahead]
             if other.order is not None and other.order.circle is not None:
-                taken.append(free_space.CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
+                taken.append(room.CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
             taken.append(np.array(way))
-        return free_space.circling_room(self._constraints, start, target, free_space.CIRCLE_M, taken)
+        return room.circling_room(self._constraints, start, target, room.CIRCLE_M, taken)
 
     def _local(self, position: Position) -> FloatArray:
         east, north = self._live.frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))

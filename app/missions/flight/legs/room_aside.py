@@ -18,7 +18,7 @@ from app.missions.flight.legs.next_moment import CLOSING_M, WAITING_S, Imminent,
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
-from app.missions.safety.free_space import CIRCLE_M
+from app.missions.safety.room import CIRCLE_M
 from app.missions.team import Member
 from app.missions.views.mission import Level
 

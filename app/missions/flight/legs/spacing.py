@@ -13,7 +13,7 @@ from app.missions.flight.decisions.decision import Decision
 from app.missions.flight.decisions.leg import Leg
 from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.live.mission import LiveMission
-from app.missions.safety import free_space
+from app.missions.safety import room
 from app.missions.task.constraints import INSET_M
 
 PATIENCE = 1
@@ -74,9 +74,9 @@ class LegSpacing:
         """
         if not planned.unplanned:
             return ways_aside(start, planned.target_m, self._constraints.for_plans, bottom)
-        if free_space.distance_outside_m(Polygon(self._constraints.area), start[:2]) == 0.0:
+        if room.distance_outside_m(Polygon(self._constraints.area), start[:2]) == 0.0:
             return np.zeros((0, 3))
-        beside = free_space.ways_beside(self._constraints, start[:2], self._live.spec.limits.max_step_m)
+        beside = room.ways_beside(self._constraints, start[:2], self._live.spec.limits.max_step_m)
         beside = beside[np.argsort(np.hypot(*(beside - planned.target_m[:2]).T), kind="stable")]
-        ends = [*free_space.ways_in(self._constraints, start[:2], INSET_M), *beside]
+        ends = [*room.ways_in(self._constraints, start[:2], INSET_M), *beside]
         return np.array([np.append(end, planned.target_m[2]) for end in ends]).reshape(-1, 3)

@@ -14,7 +14,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
 from app.missions.flown import Phase
 from app.missions.recovery.failsafes import with_reserve_s
-from app.missions.safety.free_space import CIRCLE_M
+from app.missions.safety.room import CIRCLE_M
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import OrderKind
 from app.missions.spec.surface_policy import SurfacePolicy

@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.arrays import FloatArray
-from app.estimation.uncertainty import COMPONENTS, BeamGeometry, uncertainty
+from app.estimation.uncertainty import COMPONENTS, BeamPaths, uncertainty
 from app.mapping.s44 import Order, max_thu_m, max_tvu_m, thu_m, tvu_m
 from app.missions.live.mission import LiveMission
 from app.missions.maps.snapshot import MapSnapshot
@@ -38,7 +38,7 @@ def budget_from(snapshot: MapSnapshot, travel_m: float) -> UncertaintyBudgetView
     depth_m = float(np.nanmean(snapshot.built.map.depth_m))
     below_m = max(depth_m - travel_m, LEAST_BELOW_M)
     count = len(ANGLES_DEG)
-    beams = BeamGeometry(np.radians(ANGLES_DEG), np.full(count, below_m), np.zeros(count))
+    beams = BeamPaths(np.radians(ANGLES_DEG), np.full(count, below_m), np.zeros(count))
     components = [
         _component(name, one.title, one.unit, one.sd(spec.uncertainty), one.down(beams), one.aside(beams))
         for name, one in COMPONENTS.items()

@@ -27,7 +27,7 @@ from app.missions.maps.products import (
     Material,
     Product,
     ProductOptions,
-    Surveyed,
+    SurveyTimes,
     check_options,
     frame_of,
     make_product,
@@ -153,7 +153,7 @@ async def export(
         soundings=await _sounding_file(live, provider, needs, chosen),
         tracks=await track_lines(live) if TRACKS in needs else (),
         search=search_of(live) if SEARCH in needs else None,
-        surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
+        surveyed=await surveyed(live) if SURVEY in needs else SurveyTimes(),
         crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
     )
     try:
@@ -191,17 +191,17 @@ async def _sounding_file(
     return None
 
 
-async def surveyed(live: LiveMission) -> Surveyed:
+async def surveyed(live: LiveMission) -> SurveyTimes:
     """Return when a mission's soundings and pings were made."""
     await live.journal.flush()
     async with live.database.reading() as session:
         extent = await sounding_queries.extent(session, live.id, Verdict.ACCEPTED)
         period = await ping_queries.period(session, live.id, without=live.pings.taken_back)
     if extent is None:
-        return Surveyed() if period is None else Surveyed(*period)
+        return SurveyTimes() if period is None else SurveyTimes(*period)
     if period is None:
-        return Surveyed(extent.first_time_s, extent.last_time_s, extent.position_sd_m)
-    return Surveyed(min(extent.first_time_s, period[0]), max(extent.last_time_s, period[1]))
+        return SurveyTimes(extent.first_time_s, extent.last_time_s, extent.position_sd_m)
+    return SurveyTimes(min(extent.first_time_s, period[0]), max(extent.last_time_s, period[1]))
 
 
 async def track_lines(live: LiveMission) -> list[Track]:

@@ -23,7 +23,7 @@ from app.missions.errors import (
 )
 from app.missions.live.mission import LiveMission
 from app.missions.maps.builder import make_grid
-from app.missions.maps.site_maps import SiteChange, SiteFacts, SiteMap, Surveyed, moment
+from app.missions.maps.site_maps import SiteChange, SiteFacts, SiteMap, SiteSurvey, moment
 from app.missions.maps.survey_codec import unpack_survey
 from app.missions.running.final_maps import FinalMaps
 from app.missions.spec.site import SiteSpec
@@ -54,7 +54,7 @@ class _Fused:
 
     facts: SiteFacts
     fusion: SiteFusion
-    surveys: Sequence[Surveyed]
+    surveys: Sequence[SiteSurvey]
     taken: dict[str, _Taken]
 
     @property
@@ -312,9 +312,9 @@ def _comparable(
     )
 
 
-def _surveyed(row: SiteSurveyRow) -> Surveyed:
+def _surveyed(row: SiteSurveyRow) -> SiteSurvey:
     datum = VerticalDatum(row.summary["datum_epsg"], row.summary["vertical_datum"])
-    return Surveyed(row.mission_id, row.mission_name, row.last_time_s, datum)
+    return SiteSurvey(row.mission_id, row.mission_name, row.last_time_s, datum)
 
 
 def _survey_view(row: SiteSurveyRow, state: str | None, fused: _Fused) -> SurveyView:

@@ -1,6 +1,6 @@
 """What orders of S-44 the survey meets, and what it does not show."""
 
-from app.missions.report.document import Block, Paragraph, Points, Table, Text
+from app.missions.report.document import Block, Paragraph, Statements, Table, Text
 from app.missions.report.writer import Writer
 
 
@@ -23,7 +23,7 @@ def s44(w: Writer) -> list[Block]:
         Paragraph(t("s44_words")),
         Table(columns, rows, (1, 2, 3), caption=t("caption_s44")),
         Paragraph(t("cannot_be_said"), note=True),
-        Points(_not_said(w)),
+        Statements(_not_said(w)),
     ]
 
 

@@ -9,7 +9,7 @@ from shapely import LineString, Point, Polygon
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.missions.flight.decisions.separation import ways_aside
-from app.missions.safety.free_space import ways_beside, ways_in
+from app.missions.safety.room import ways_beside, ways_in
 
 AREA = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
 ZONE = np.array([[40.0, 40.0], [60.0, 40.0], [60.0, 60.0], [40.0, 60.0]])

@@ -15,7 +15,7 @@ from app.missions.fleet.interface import LinkState, Position, WaypointStatus
 from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
-from app.missions.safety.free_space import CIRCLE_M
+from app.missions.safety.room import CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.failsafes import Response

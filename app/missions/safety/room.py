@@ -13,7 +13,7 @@ from shapely.ops import nearest_points, unary_union
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from imc_bridge.control.orders import FLOWN_STRAIGHT_M
 from imc_bridge.control.plans import CIRCLE_RADIUS_M
 

@@ -13,7 +13,7 @@ from shapely.geometry import LineString, Polygon
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, Limit
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.free_space import FreeSpace
 from app.missions.flight.decisions.decision import Knowledge, decide
 from app.missions.flight.decisions.leg import Place
 from app.missions.safety.zone_clearance import room_around

@@ -23,7 +23,7 @@ CLOSED_UP = (1.0, 0.5, 0.2)
 """Sizes of the team, in those of the wish, that are tried where it does not fit."""
 
 
-class Free(NamedTuple):
+class AllowedRaster(NamedTuple):
     """Raster of allowed cells.
 
     Attributes
@@ -46,7 +46,7 @@ class Free(NamedTuple):
     everywhere: bool
 
 
-def free_space(constraints: Constraints) -> Free:
+def allowed_raster(constraints: Constraints) -> AllowedRaster:
     """Rasterise the area without its keep-out zones."""
     area = constraints.area
     low, high = area.min(axis=0), area.max(axis=0)
@@ -65,14 +65,14 @@ def free_space(constraints: Constraints) -> Free:
     clear = binary_erosion(allowed, np.ones((3, 3), dtype=bool), iterations=PUSH_CELLS, border_value=1)
     goal = clear if not everywhere and clear.any() else allowed
     index = distance_transform_edt(~goal, return_distances=False, return_indices=True)
-    return Free(
+    return AllowedRaster(
         float(low[0]), float(low[1]), cell, allowed, np.ascontiguousarray(np.moveaxis(index, 0, -1)).astype(np.int64),
         everywhere,
     )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)
-def is_allowed(free: Free, x: float, y: float) -> bool:
+def is_allowed(free: AllowedRaster, x: float, y: float) -> bool:
     """Whether the cell around (x, y) is allowed."""
     c = int(np.floor((x - free.west_m) / free.cell_m))
     r = int(np.floor((y - free.south_m) / free.cell_m))
@@ -80,7 +80,7 @@ def is_allowed(free: Free, x: float, y: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def push(free: Free, at: FloatArray) -> None:
+def push(free: AllowedRaster, at: FloatArray) -> None:
     """Move positions (n_vehicles, 2) that are not allowed to the closest allowed cell."""
     rows, cols = free.allowed.shape
     for i in range(len(at)):
@@ -116,7 +116,7 @@ def pull_together(at: FloatArray, chain: NDArray[np.int64], link: float) -> bool
 
 
 @njit(cache=True, nogil=True)
-def settle_waypoint(free: Free, at: FloatArray, chain: NDArray[np.int64], link: float) -> bool:
+def settle_waypoint(free: AllowedRaster, at: FloatArray, chain: NDArray[np.int64], link: float) -> bool:
     """Make a team waypoint (n_vehicles, 2) obey area, zones and links; False when that does not succeed.
 
     Where the team does not fit as it is (zones may drive it apart) it is tried closed up.
@@ -144,7 +144,7 @@ def settle_waypoint(free: Free, at: FloatArray, chain: NDArray[np.int64], link: 
 
 
 @njit(cache=True, nogil=True)
-def _worst_place(free: Free, a: FloatArray, b: FloatArray) -> float:
+def _worst_place(free: AllowedRaster, a: FloatArray, b: FloatArray) -> float:
     """Return where on the way from a to b (n_vehicles, 2) a vehicle gets deepest into what is forbidden.
 
     As a fraction of the way; -1 when the whole way is allowed. Until a vehicle first comes to an allowed place it is
@@ -184,7 +184,9 @@ def insert(plan: Plan, count: int, k: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def clear_ways(free: Free, plan: Plan, count: int, start: FloatArray, first: int, last: int, link: float) -> int:
+def clear_ways(
+    free: AllowedRaster, plan: Plan, count: int, start: FloatArray, first: int, last: int, link: float
+) -> int:
     """Make the legs that lead to the waypoints ``first`` .. ``last`` allowed, inserting detours where needed.
 
     Returns the new number of waypoints; -1 when some leg stays forbidden.

@@ -16,7 +16,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Proposal, Situation
 from app.missions.flight.decisions.decision import Knowledge, decide
-from app.missions.safety import free_space, tide_and_bottom, travel_depth, waypoint_check
+from app.missions.safety import room, tide_and_bottom, travel_depth, waypoint_check
 from app.missions.task.constraints import make_constraints
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
@@ -528,7 +528,7 @@ def test_without_a_margin_legs_may_pass_along_a_zone() -> None:
 
 def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others() -> None:
     start, target, radius = np.array([45.0, 5.0]), np.array([50.0, 12.0]), 8.0
-    centre = free_space.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
+    centre = room.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
     assert centre is not None
     circle = Point(centre).buffer(radius - 0.1)
     assert Polygon(AREA).contains(circle)
@@ -550,7 +550,7 @@ def test_where_there_is_no_room_for_a_circle_none_is_given(
     start: tuple[float, float], target: tuple[float, float], radius: float, taken: list[list[list[float]]]
 ) -> None:
     ways = [np.array(way) for way in taken]
-    assert free_space.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
+    assert room.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
 
 
 @pytest.mark.parametrize(
