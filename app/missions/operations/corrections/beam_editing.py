@@ -1,5 +1,6 @@
 """Beams of swath sonars as points, and an operator's word on any of them: they count, or they do not."""
 
+import asyncio
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -159,6 +160,19 @@ class _Found:
 
 async def _select(live: LiveMission, selection: BeamSelection, take: Callable[[_Found], None]) -> None:
     """Look through all accepted pings for the beams of a selection; ``take`` runs in threads, once for some pings."""
+    # Each looks at all beams, in the threads that make maps.
+    async with live.part(_Turn).taken:
+        await _look_through(live, selection, take)
+
+
+class _Turn:
+    """The beams of a mission are looked through once at a time."""
+
+    def __init__(self, _live: LiveMission) -> None:
+        self.taken = asyncio.Lock()
+
+
+async def _look_through(live: LiveMission, selection: BeamSelection, take: Callable[[_Found], None]) -> None:
     await live.journal.flush()
     until = await live.pings.newest_block()
     area = None
