@@ -135,6 +135,20 @@ class Sounding:
 
 
 @dataclass(frozen=True, slots=True)
+class SoundSpeedSample:
+    """How fast sound was where a vehicle was, by one of its probes; ``depth_m`` is below the surface."""
+
+    vehicle: str
+    time_s: float
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+    speed_mps: float
+    source: str
+    """The probe's entity."""
+
+
+@dataclass(frozen=True, slots=True)
 class SoundingRefused:
     """A Distance that did not become a sounding, and why."""
 

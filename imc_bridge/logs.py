@@ -20,7 +20,7 @@ from typing import Literal, Protocol, cast
 
 import imcpy
 
-from imc_bridge.events import PingRefused, Sounding, SoundingRefused, StateReport, SwathPing
+from imc_bridge.events import PingRefused, Sounding, SoundingRefused, SoundSpeedSample, StateReport, SwathPing
 from imc_bridge.network.codec import (
     FOOTER_SIZE,
     HEADER_SIZE,
@@ -52,11 +52,23 @@ WASTED_TIMES = 8
 UNPACKED_TIMES = 100
 """Telemetry is packed to a tenth. What grows more than this and ``SPARE_BYTES`` was made to fill a machine."""
 
-OWN = ("EstimatedState", "Distance", "NavigationUncertainty", "EntityList", "EntityInfo", "FuelLevel", "SonarData")
+OWN = (
+    "EstimatedState",
+    "Distance",
+    "NavigationUncertainty",
+    "EntityList",
+    "EntityInfo",
+    "FuelLevel",
+    "SonarData",
+    "SoundSpeed",
+)
 IDENTIFYING = ("Announce", "EntityList", "EntityInfo")
 VEHICLE_SENDS = message_ids(("EstimatedState",))
 
-LogEvent = StateReport | Sounding | SoundingRefused | SwathPing | PingRefused
+LogEvent = StateReport | Sounding | SoundingRefused | SwathPing | PingRefused | SoundSpeedSample
+
+STATE_GAP_S = 2.0
+"""A probe's speed is of the place of the last state where that is no older than this."""
 
 
 class LogError(Exception):
@@ -351,6 +363,19 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
             lost = node.pings.offer(node.entity_name(header.src_ent), message)
             if lost is not None:
                 yield lost
+        case "SoundSpeed":
+            last, time_s = node.report, message.timestamp
+            # A negative one is DUNE's word for none.
+            if last is not None and 0.0 <= time_s - last.time_s <= STATE_GAP_S and message.value > 0.0:
+                yield SoundSpeedSample(
+                    vehicle=node.name,
+                    time_s=time_s,
+                    lat_deg=last.lat_deg,
+                    lon_deg=last.lon_deg,
+                    depth_m=last.depth_m,
+                    speed_mps=float(message.value),
+                    source=node.entity_name(header.src_ent) or "",
+                )
         case "NavigationUncertainty":
             node.take_uncertainty(message)
         case "FuelLevel":

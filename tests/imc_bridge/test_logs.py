@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 from imcpy.coordinates import WGS84
 
-from imc_bridge import BridgeSettings, PingRefused, Sounding, SoundingRefused, StateReport, SwathPing, logs
+from imc_bridge import (
+    BridgeSettings,
+    PingRefused,
+    Sounding,
+    SoundingRefused,
+    SoundSpeedSample,
+    StateReport,
+    SwathPing,
+    logs,
+)
 from imc_bridge.logs import LogError, PacketFile, VehicleLog
 from tests.support.imc import log_writer as writer
 
@@ -38,6 +47,19 @@ def test_soundings_lie_where_and_how_deep_the_bottom_was(tmp_path: Path, name: s
     assert log.refused == {}
     assert not log.file.cut_off
     assert log.file.read_bytes == log.file.size_bytes
+
+
+def test_sound_speeds_are_of_where_the_vehicle_was(tmp_path: Path) -> None:
+    begin_s = writer.START_S + 60.0
+    late = [writer.sound_speed(begin_s + 300.0, 1500.0), writer.sound_speed(begin_s + 50.0, 1500.0, writer.OTHER_ID)]
+    packets = [*writer.survey(5), *writer.dive(begin_s, 12.0, 100), *late]
+    log = VehicleLog(writer.write(tmp_path / "Data.lsf", packets), SETTINGS)
+    found = [event for event in log.events() if isinstance(event, SoundSpeedSample)]
+    assert len(found) == 100, "neither those that are none, nor far from any state, nor another vehicle's"
+    for one in found:
+        assert one.speed_mps == pytest.approx(writer.sound_speed_mps(one.depth_m), abs=1e-3)
+    assert {one.source for one in found} == {"CTD"}
+    assert max(one.depth_m for one in found) == pytest.approx(12.0)
 
 
 def test_the_same_file_gives_the_same_events_every_time(tmp_path: Path) -> None:

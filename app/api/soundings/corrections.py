@@ -14,7 +14,7 @@ from app.api.schemas import API, VehicleName
 from app.api.state import Service
 from app.mapping.s44 import Order
 from app.missions.errors import MapNotReadyError
-from app.missions.operations.corrections import adjustment, casts, patch_test, recorrection
+from app.missions.operations.corrections import adjustment, casts, measured_casts, patch_test, recorrection
 from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
@@ -23,7 +23,7 @@ from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import MOST_NAME, CastDescription, CastRules, NewCasts, SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
-from app.missions.views.measurements.corrections import CastsView, CorrectionsView, TideCorrection
+from app.missions.views.measurements.corrections import CastsView, CorrectionsView, TideCorrection, VehicleCastView
 from app.missions.views.measurements.mounting_estimate import MountingEstimateRequest, MountingEstimateView
 from app.missions.views.measurements.systematic_errors import SystematicErrorsView
 
@@ -92,6 +92,17 @@ async def get_casts(service: Service, reader: Reader, mission: Mission, order: S
     with suppress(MapNotReadyError):
         await newest_map(mission, service.maps, patient=False)
     return await casts_view(mission, order)
+
+
+@router.get(
+    "/sound-speed/measured",
+    operation_id="getMeasuredCasts",
+    summary="See the sound speed casts that vehicles measured",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def get_measured_casts(reader: Reader, mission: Mission) -> list[VehicleCastView]:
+    """Return the casts in vehicles' logs that were imported, oldest first. None counts before it is added."""
+    return await measured_casts.vehicles_casts(mission)
 
 
 @router.post(

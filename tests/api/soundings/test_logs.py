@@ -3,6 +3,7 @@
 import asyncio
 import gzip
 from collections.abc import AsyncIterator, Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,36 @@ async def test_a_log_becomes_soundings_and_a_map_as_by_the_command(
     assert (await client.get(f"/missions/{other}/logs/{listed['id']}")).json() == listed
 
 
+async def test_the_casts_in_a_log_are_offered_and_count_when_they_are_added(
+    client: httpx.AsyncClient, path: str, tmp_path: Path
+) -> None:
+    begin_s = writer.START_S + 60.0
+    packets = [*writer.survey(PINGS), *writer.dive(begin_s, 12.0, 400)]
+    content = writer.write(tmp_path / "Dive.lsf", packets).read_bytes()
+    assert (await client.get(f"{path}/sound-speed/measured")).json() == []
+    log = await ended(client, path, await send(client, path, content, filename="Dive.lsf"))
+    assert log["state"] == "done", log
+    (cast,) = (await client.get(f"{path}/sound-speed/measured")).json()
+    assert (cast["vehicle"], cast["file"]) == (writer.NAME, "Dive.lsf")
+    assert log["result"]["casts"] == [{name: cast[name] for name in cast if name not in ("vehicle", "file")}]
+    depths, speeds = zip(*cast["profile"], strict=True)
+    assert depths[0] < 1.0
+    assert depths[-1] > 11.0
+    assert speeds == pytest.approx([writer.sound_speed_mps(depth) for depth in depths], abs=0.05)
+    assert cast["samples"] == pytest.approx(390, abs=10)
+    assert datetime.fromisoformat(cast["time"]).timestamp() == pytest.approx(begin_s + 200.0, abs=20.0)
+    assert cast["position"] == pytest.approx([-8.705, 41.185], abs=1e-3)
+    assert (await client.get(f"{path}/corrections")).json()["sound_speed"] is None, "none counts by itself"
+    added = {name: cast[name] for name in ("profile", "time", "position")} | {"name": "of the vehicle"}
+    answer = await client.post(f"{path}/sound-speed/casts", json={"casts": [added]})
+    assert answer.status_code == 200, answer.text
+    # Who sends it again is told the same, and taken back it is offered no more.
+    await ended(client, path, await send(client, path, content, filename="Dive.lsf"))
+    assert len((await client.get(f"{path}/sound-speed/measured")).json()) == 1
+    assert (await client.delete(f"{path}/logs/{log['id']}")).status_code == 200
+    assert (await client.get(f"{path}/sound-speed/measured")).json() == []
+
+
 @pytest.mark.slow
 async def test_the_same_file_again_stores_nothing_and_another_run_lists_what_was_imported(
     make_settings: Callable[..., Settings], content: bytes
@@ -143,6 +174,10 @@ async def test_a_real_log_of_dune_maps_the_relief_it_flew_over(client: httpx.Asy
     log = await ended(client, path, await send(client, path, content))
     assert (log["vehicle"], log["result"]["soundings"], log["result"]["rejected"]) == ("lauv-xplore-1", 958, 0)
     assert log["result"]["refused"] == {}
+    (cast,) = log["result"]["casts"]
+    depths, speeds = zip(*cast["profile"], strict=True)
+    assert depths[-1] > 16.0
+    assert all(1490.0 < speed < 1515.0 for speed in speeds), "its simulated probe is as noisy as that"
     assert (await client.get(f"{path}/map")).json()["max_depth_m"] > 2.0
 
 

@@ -1,14 +1,11 @@
 """Beams of a multibeam rejected and restored, in space and by what they have in common, in Chromium."""
 
-import os
-from pathlib import Path
-
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, show, violations
+from tests.support.dashboard.steps import by_id, picture, show, violations
 from tests.support.mapping.school import ANGLES, PINGS, surveyed
 from tests.support.missions.specs import rectangle
 
@@ -25,12 +22,6 @@ def school(service: Service) -> str:
     service.post(f"/missions/{mission}/measurements", {"items": surveyed("rover", 1.79e9)})
     service.get(f"/missions/{mission}/map")
     return mission
-
-
-def picture(page: Page, name: str) -> None:
-    if where := os.environ.get("DASHBOARD_LOOK"):
-        Path(where).mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=f"{where}/{name}.png")
 
 
 def test_beams_are_chosen_in_space_rejected_and_taken_back(watched: Watched, service: Service, school: str) -> None:
@@ -113,8 +104,5 @@ def test_outer_and_shoal_beams_are_rejected_together_and_listed(
         | dict.fromkeys(("area", "from_s", "until_s", "least_depth_m", "least_angle_deg"))
     ]
     assert violations(page) == []
-    page.set_viewport_size({"width": 390, "height": 800})
-    by_id(page, "toggle-missions").click() if by_id(page, "toggle-missions").count() else None
-    picture(page, "beam-edits-narrow")
     # The browser's own line for the answer that was refused is no fault of the page.
     assert [line for line in watched.complaints if "422" not in line] == []

@@ -1,6 +1,7 @@
 """Tide and sound speed are corrected when all was measured, in Chromium."""
 
 import re
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import FilePayload, Route, expect
@@ -8,6 +9,7 @@ from playwright.sync_api import FilePayload, Route, expect
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, picture, show, violations
+from tests.support.imc import log_writer
 from tests.support.mapping.calibration import REAL, calibration
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.specs import rectangle
@@ -162,6 +164,32 @@ def test_what_cannot_be_taken_is_told_and_changes_nothing(watched: Watched, serv
     by_id(page, "corrections-set-speed").click()
     expect(pane.get_by_role("alert")).to_contain_text("profile")
     assert service.get(corrections) == before
+
+
+def test_a_cast_that_a_vehicle_measured_is_filled_in_and_added(
+    watched: Watched, service: Service, surveyed: str, tmp_path: Path
+) -> None:
+    page = watched.page
+    show(page, surveyed)
+    by_id(page, "toggle-corrections").click()
+    expect(by_id(page, "casts")).to_be_visible()
+    expect(by_id(page, "measured-cast")).to_have_count(0)
+    log = log_writer.write(tmp_path / "Dive.lsf", [*log_writer.survey(5), *log_writer.dive(START_S + 600, 12.0, 400)])
+    service.send_log(surveyed, log, "rover")
+    measured_ = by_id(page, "measured-cast")
+    expect(measured_).to_have_count(1)
+    expect(measured_).to_contain_text("rover")
+    expect(measured_).to_contain_text("down to 1")
+    expect(measured_).to_contain_text("speeds, ± 0.")
+    measured_.get_by_role("button", name="Fill in").click()
+    expect(by_id(page, "cast-text")).to_have_value(re.compile(r"^0\.\d+ 1511\.\d+\n"))
+    by_id(page, "cast-add").click()
+    expect(by_id(page, "cast")).to_have_count(1)
+    expect(by_id(page, "cast")).to_contain_text("rover 20")
+    picture(page, "casts-of-vehicles")
+    told = service.get(f"/missions/{surveyed}/corrections")["sound_speed"]
+    assert (told["source"], len(told["profile"]) > 15) == ("Dive.lsf", True)
+    assert [one for one in violations(page) if "-rover" not in one] == []
 
 
 def test_casts_are_added_from_files_changed_and_removed(watched: Watched, service: Service, surveyed: str) -> None:

@@ -74,6 +74,7 @@ CONTRACT = {
     "PUT /missions/{mission_id}/sound-speed": "setSoundSpeed",
     "DELETE /missions/{mission_id}/sound-speed": "deleteSoundSpeed",
     "GET /missions/{mission_id}/sound-speed/casts": "getCasts",
+    "GET /missions/{mission_id}/sound-speed/measured": "getMeasuredCasts",
     "POST /missions/{mission_id}/sound-speed/casts": "addCasts",
     "PUT /missions/{mission_id}/sound-speed/casts/{name}": "setCast",
     "DELETE /missions/{mission_id}/sound-speed/casts/{name}": "deleteCast",

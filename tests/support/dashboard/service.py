@@ -98,6 +98,12 @@ class Service:
         answer = self._http.post(f"/api/v1{path}", json=content)
         return answer.raise_for_status().json()
 
+    def send_log(self, mission: str, log: Path, vehicle: str) -> None:
+        """Send a vehicle's log, which is read from then on."""
+        params = {"filename": log.name, "vehicle": vehicle}
+        answer = self._http.post(f"/api/v1/missions/{mission}/logs", content=log.read_bytes(), params=params)
+        answer.raise_for_status()
+
     def create(self, **changes: Any) -> str:
         """Describe a mission over the API, without what is None, and return its id."""
         spec = {

@@ -14,7 +14,7 @@ from tests.support.imc.sonar_data import sonar_data
 
 VEHICLE_ID, OTHER_ID = 0x1E, 0x1F
 NAME = "lauv-log-1"
-ALTIMETER, FORWARD, MULTIBEAM = 58, 59, 60
+ALTIMETER, FORWARD, MULTIBEAM, PROBE = 58, 59, 60, 61
 LAT_RAD, LON_RAD = math.radians(41.185), math.radians(-8.705)
 START_S = 1_795_225_140.0
 SPEED_MPS = 1.5
@@ -37,10 +37,10 @@ def packet(message: object, time_s: float, src: int = VEHICLE_ID, entity: int = 
     return bytes(imcpy.Packet.serialize(again))
 
 
-def state(time_s: float, north_m: float, src: int = VEHICLE_ID) -> bytes:
+def state(time_s: float, north_m: float, src: int = VEHICLE_ID, depth_m: float = VEHICLE_DEPTH_M) -> bytes:
     message = imcpy.EstimatedState()
     message.lat, message.lon = WGS84.displace(LAT_RAD, LON_RAD, north_m, 5.0)
-    message.depth = VEHICLE_DEPTH_M
+    message.depth = depth_m
     message.vx = SPEED_MPS
     message.alt = -1.0
     return packet(message, time_s, src)
@@ -62,6 +62,28 @@ def ping(time_s: float, height_m: float) -> bytes:
     return packet(sonar_data(points, start_rad=START_RAD, width_rad=WIDTH_RAD), time_s, entity=MULTIBEAM)
 
 
+def sound_speed(time_s: float, value: float, src: int = VEHICLE_ID) -> bytes:
+    """Of a probe."""
+    message = imcpy.SoundSpeed()
+    message.value = value
+    return packet(message, time_s, src, PROBE)
+
+
+def sound_speed_mps(depth_m: float) -> float:
+    """What it is where vehicles of these logs dive."""
+    return 1512.0 - 0.5 * depth_m
+
+
+def dive(begin_s: float, deepest_m: float, seconds: int) -> Iterator[bytes]:
+    """Down and up again, evenly, with a speed of sound each second and one that is none."""
+    for tick in range(seconds):
+        time_s = begin_s + tick
+        depth_m = deepest_m * (1.0 - abs(2.0 * tick / seconds - 1.0))
+        yield state(time_s, 0.0, depth_m=depth_m)
+        yield sound_speed(time_s + 0.1, sound_speed_mps(depth_m))
+        yield sound_speed(time_s + 0.2, -1.0)
+
+
 def announce(time_s: float, name: str = NAME, src: int = VEHICLE_ID) -> bytes:
     message = imcpy.Announce()
     message.sys_name = name
@@ -73,7 +95,7 @@ def announce(time_s: float, name: str = NAME, src: int = VEHICLE_ID) -> bytes:
 def entities(time_s: float) -> bytes:
     message = imcpy.EntityList()
     message.op = imcpy.EntityList.OperationEnum.REPORT
-    message.list = f"Daemon=0;Altimeter={ALTIMETER};Echo Sounder={FORWARD};Multibeam={MULTIBEAM}"
+    message.list = f"Daemon=0;Altimeter={ALTIMETER};Echo Sounder={FORWARD};Multibeam={MULTIBEAM};CTD={PROBE}"
     return packet(message, time_s)
 
 

@@ -1,20 +1,23 @@
 """A vehicle's own log, read in batches that are the same every time; nothing is stored here."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
 from app.mapping.coordinates.distances import horizontal_distance_m
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.water.measured_casts import MeasuredCast, SoundSpeedSamples, measured_casts
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.interface import PingReport, Position, SoundingReport, VehicleReport
 from app.missions.fleet.links.imc import ping_report, sounding_report, vehicle_report
 from app.missions.live.journals.journal import TRACK_SPACING_M
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.operations.imports.multibeam_log import MultibeamLog, is_multibeam
-from imc_bridge import Sounding, StateReport, SwathPing
+from imc_bridge import Sounding, SoundSpeedSample, StateReport, SwathPing
 from imc_bridge.logs import LogContent, LogError, LogEvent, VehicleLog
 from imc_bridge.settings import BridgeSettings
 
@@ -22,6 +25,9 @@ BATCH = 1000
 """Soundings and positions of one transaction. Batches already written are known by their number: never change it."""
 PING_BATCH = 500
 """Pings of one transaction, which have batches of their own; never change it either."""
+
+MOST_SPEEDS = 200_000
+"""Of one probe so many speeds of sound are kept at most, some hours at full rate; of more every second one."""
 
 Report = SoundingReport | VehicleReport | PingReport
 
@@ -62,6 +68,29 @@ class LogFacts:
     refused: dict[str, int]
     unreadable: dict[str, int]
     notes: list[str]
+    casts: list[MeasuredCast] = field(default_factory=list)
+    """Sound speed casts that the vehicle measured."""
+
+
+class _Water:
+    """Sound speeds of one probe, as a bounded number of them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._every = 1
+        self._rows: list[tuple[float, float, float, float, float]] = []
+
+    def add(self, one: SoundSpeedSample) -> None:
+        """Take one in."""
+        if self.count % self._every == 0:
+            self._rows.append((one.time_s, one.depth_m, one.speed_mps, one.lat_deg, one.lon_deg))
+            if len(self._rows) > MOST_SPEEDS:
+                self._every, self._rows = 2 * self._every, self._rows[::2]
+        self.count += 1
+
+    def samples(self) -> SoundSpeedSamples:
+        """Return them, or evenly some of them."""
+        return SoundSpeedSamples(*np.array(self._rows, dtype=float).reshape(-1, 5).T)
 
 
 class LogBatches:
@@ -79,6 +108,8 @@ class LogBatches:
     """
 
     def __init__(self, content: LogContent, vehicle: str | None, bridge: BridgeSettings, near: Near) -> None:
+        self._water: defaultdict[str, _Water] = defaultdict(_Water)
+        """By probe what it measured of the sound's speed."""
         self._frame = LocalFrame(near.origin_lat_deg, near.origin_lon_deg)
         self._zone = Polygon(near.area).buffer(near.margin_m)
         shapely.prepare(self._zone)
@@ -112,7 +143,13 @@ class LogBatches:
             refused=dict(log.refused),
             unreadable=dict(log.faults),
             notes=list(log.notes) if isinstance(log, MultibeamLog) else [],
+            casts=self._casts(),
         )
+
+    def _casts(self) -> list[MeasuredCast]:
+        """Return the casts of the probe that measured most."""
+        most = max(self._water.values(), key=lambda water: water.count, default=None)
+        return [] if most is None else measured_casts(most.samples())
 
     def __iter__(self) -> Iterator[LogBatch]:
         """Yield everything from the beginning."""
@@ -129,11 +166,14 @@ class LogBatches:
     def _reports(self) -> Iterator[Report]:
         """Yield every sounding, and the track near the area thinned like that of live telemetry."""
         last: tuple[float, float] | None = None
+        self._water.clear()
         for event in self._events():
             if isinstance(event, Sounding):
                 yield sounding_report(event)
             elif isinstance(event, SwathPing):
                 yield ping_report(event)
+            elif isinstance(event, SoundSpeedSample):
+                self._water[event.source].add(event)
             elif isinstance(event, StateReport):
                 end = (event.lat_deg, event.lon_deg)
                 if last is None or horizontal_distance_m(last, end) >= TRACK_SPACING_M:

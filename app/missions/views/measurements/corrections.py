@@ -11,6 +11,7 @@ from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import ProfileDepth, ProfileSpeed, SoundSpeed, Tide
 from app.missions.views.base import View
+from app.missions.views.measurements.soundings import MeasuredCastView
 
 
 class TideCorrection(Tide):
@@ -75,6 +76,13 @@ class CastView(View):
     first: datetime | None = Field(description="Time of the first of them; null: it corrects none")
     last: datetime | None = Field(description="Time of the last of them")
     farthest_h: float | None = Field(description="How far one of them is away from it in time at most, hours")
+
+
+class VehicleCastView(MeasuredCastView):
+    """A sound speed cast in a vehicle's log."""
+
+    vehicle: str
+    file: str = Field(description="The log's name")
 
 
 class CastChangeView(View):

@@ -1,10 +1,13 @@
 """What is answered about soundings, batches of them and logs."""
 
 from collections.abc import Mapping
+from datetime import datetime
 from enum import StrEnum
 
 from pydantic import Field
 
+from app.missions.spec.base import Latitude, Longitude
+from app.missions.spec.water import ProfileDepth, ProfileSpeed
 from app.missions.views.base import View
 
 
@@ -117,6 +120,18 @@ class BatchVerdict(View):
     )
 
 
+class MeasuredCastView(View):
+    """A sound speed cast that a vehicle measured on its way; beyond its depths nothing is known."""
+
+    time: datetime = Field(description="The middle of the time in which it was measured, by the vehicle's clock")
+    position: tuple[Longitude, Latitude] = Field(description="The middle of where, [longitude, latitude]")
+    profile: list[tuple[ProfileDepth, ProfileSpeed]] = Field(
+        description="[depth in m, speed in m/s] from top to bottom: means and medians of bins of half a metre, or more"
+    )
+    sd_mps: float = Field(description="How far single speeds lie from those of their bins, as a standard deviation")
+    samples: int = Field(description="Speeds that it is made of")
+
+
 class LogImportView(View):
     """What came of a vehicle's log."""
 
@@ -137,6 +152,9 @@ class LogImportView(View):
     skipped_bytes: int = Field(description="Bytes that are no packet")
     cut_off: bool = Field(description="The file ends in the middle, as after a power loss; what came before is used")
     notes: list[str] = Field(default=[], description="What was assumed or done, in words")
+    casts: list[MeasuredCastView] = Field(
+        default=[], description="Sound speed casts that the vehicle measured; none counts before it is added"
+    )
     known: bool = Field(description="The whole log had been imported before; nothing was written")
 
 

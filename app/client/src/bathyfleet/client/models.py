@@ -1197,6 +1197,8 @@ class LogImportView(Model):
     """The file ends in the middle, as after a power loss; what came before is used"""
     notes: list[str]
     """What was assumed or done, in words"""
+    casts: list[MeasuredCastView]
+    """Sound speed casts that the vehicle measured; none counts before it is added"""
     known: bool
     """The whole log had been imported before; nothing was written"""
 
@@ -1273,6 +1275,21 @@ class MapView(Model):
     sounded: list[list[bool]]
     layers: dict[str, list[list[float | None]]]
     """Further layers that were asked for, by name"""
+
+
+class MeasuredCastView(Model):
+    """A sound speed cast that a vehicle measured on its way; beyond its depths nothing is known."""
+
+    time: datetime
+    """The middle of the time in which it was measured, by the vehicle's clock"""
+    position: tuple[float, float]
+    """The middle of where, [longitude, latitude]"""
+    profile: list[tuple[float, float]]
+    """[depth in m, speed in m/s] from top to bottom: means and medians of bins of half a metre, or more"""
+    sd_mps: float
+    """How far single speeds lie from those of their bins, as a standard deviation"""
+    samples: int
+    """Speeds that it is made of"""
 
 
 class Measurement(Model):
@@ -2957,6 +2974,24 @@ class UncertaintyBudgetView(Model):
     components: list[ComponentView]
     totals: list[TotalView]
     allowed: list[AllowedView]
+
+
+class VehicleCastView(Model):
+    """A sound speed cast in a vehicle's log."""
+
+    time: datetime
+    """The middle of the time in which it was measured, by the vehicle's clock"""
+    position: tuple[float, float]
+    """The middle of where, [longitude, latitude]"""
+    profile: list[tuple[float, float]]
+    """[depth in m, speed in m/s] from top to bottom: means and medians of bins of half a metre, or more"""
+    sd_mps: float
+    """How far single speeds lie from those of their bins, as a standard deviation"""
+    samples: int
+    """Speeds that it is made of"""
+    vehicle: str
+    file: str
+    """The log's name"""
 
 
 class VehicleDiagnosis(Model):

@@ -513,6 +513,14 @@ class Operations(ABC):
             body=body,
         ))
 
+    def get_measured_casts(self, mission_id: str) -> list[models.VehicleCastView]:
+        """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``."""
+        return self._call(Call[list[models.VehicleCastView]](
+            "GET",
+            f"/missions/{part(mission_id)}/sound-speed/measured",
+            list[models.VehicleCastView],
+        ))
+
     def set_cast(
         self,
         mission_id: str,
@@ -2221,6 +2229,14 @@ class AsyncOperations(ABC):
             f"/missions/{part(mission_id)}/sound-speed/casts",
             models.CorrectionsView,
             body=body,
+        ))
+
+    async def get_measured_casts(self, mission_id: str) -> list[models.VehicleCastView]:
+        """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``."""
+        return await self._call(Call[list[models.VehicleCastView]](
+            "GET",
+            f"/missions/{part(mission_id)}/sound-speed/measured",
+            list[models.VehicleCastView],
         ))
 
     async def set_cast(

@@ -64,6 +64,7 @@ import type {
   TideCorrection,
   TimedTracks,
   TrafficView,
+  VehicleCastView,
   VehicleView,
 } from "./types";
 import { upload } from "./upload";
@@ -360,6 +361,7 @@ export const api = {
   deleteSoundSpeed: (id: string) =>
     request<CorrectionsView>(`${missionPath(id)}/sound-speed`, { method: "DELETE" }),
   casts: (id: string) => request<CastsView>(`${missionPath(id)}/sound-speed/casts`),
+  measuredCasts: (id: string) => request<VehicleCastView[]>(`${missionPath(id)}/sound-speed/measured`),
   addCasts: (id: string, casts: NewCasts) =>
     post<CorrectionsView>(`${missionPath(id)}/sound-speed/casts`, casts, STORED),
   deleteCast: (id: string, name: string) =>

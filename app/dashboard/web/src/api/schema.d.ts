@@ -781,6 +781,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/sound-speed/measured": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the sound speed casts that vehicles measured
+         * @description Return the casts in vehicles' logs that were imported, oldest first. None counts before it is added.
+         */
+        get: operations["getMeasuredCasts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/sound-speed/casts/{name}": {
         parameters: {
             query?: never;
@@ -4620,6 +4640,12 @@ export interface components {
              */
             notes: string[];
             /**
+             * Casts
+             * @description Sound speed casts that the vehicle measured; none counts before it is added
+             * @default []
+             */
+            casts: components["schemas"]["MeasuredCastView"][];
+            /**
              * Known
              * @description The whole log had been imported before; nothing was written
              */
@@ -4790,6 +4816,44 @@ export interface components {
             layers: {
                 [key: string]: (number | null)[][];
             };
+        };
+        /**
+         * MeasuredCastView
+         * @description A sound speed cast that a vehicle measured on its way; beyond its depths nothing is known.
+         */
+        MeasuredCastView: {
+            /**
+             * Time
+             * Format: date-time
+             * @description The middle of the time in which it was measured, by the vehicle's clock
+             */
+            time: string;
+            /**
+             * Position
+             * @description The middle of where, [longitude, latitude]
+             */
+            position: [
+                number,
+                number
+            ];
+            /**
+             * Profile
+             * @description [depth in m, speed in m/s] from top to bottom: means and medians of bins of half a metre, or more
+             */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Sd Mps
+             * @description How far single speeds lie from those of their bins, as a standard deviation
+             */
+            sd_mps: number;
+            /**
+             * Samples
+             * @description Speeds that it is made of
+             */
+            samples: number;
         };
         /**
          * Measurement
@@ -8692,6 +8756,51 @@ export interface components {
             allowed: components["schemas"]["AllowedView"][];
         };
         /**
+         * VehicleCastView
+         * @description A sound speed cast in a vehicle's log.
+         */
+        VehicleCastView: {
+            /**
+             * Time
+             * Format: date-time
+             * @description The middle of the time in which it was measured, by the vehicle's clock
+             */
+            time: string;
+            /**
+             * Position
+             * @description The middle of where, [longitude, latitude]
+             */
+            position: [
+                number,
+                number
+            ];
+            /**
+             * Profile
+             * @description [depth in m, speed in m/s] from top to bottom: means and medians of bins of half a metre, or more
+             */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Sd Mps
+             * @description How far single speeds lie from those of their bins, as a standard deviation
+             */
+            sd_mps: number;
+            /**
+             * Samples
+             * @description Speeds that it is made of
+             */
+            samples: number;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * File
+             * @description The log's name
+             */
+            file: string;
+        };
+        /**
          * VehicleDiagnosis
          * @description What was found of one vehicle.
          */
@@ -12073,20 +12182,21 @@ export interface operations {
             path: {
                 /** @description The site's id */
                 site_id: string;
-                /** @description One of tif, png, xyz, geojson, kml, dxf */
+                /** @description One of tif, bag, png, xyz, geojson, kml, dxf */
                 format: string;
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            /** @description `.tif`: GeoTIFF with depth, deviation, age and survey of each cell; `.png`: the site's map as a picture; `.xyz`: text: position, depth, deviation, surveys, sounded; `.geojson`: depth contours; `.kml`: depth contours for virtual globes; `.dxf`: depth contours for CAD (DXF R12), in metres */
+            /** @description `.tif`: GeoTIFF with depth, deviation, age and survey of each cell; `.bag`: BAG with elevation and deviation, for hydrographic offices; `.png`: the site's map as a picture; `.xyz`: text: position, depth, deviation, surveys, sounded; `.geojson`: depth contours; `.kml`: depth contours for virtual globes; `.dxf`: depth contours for CAD (DXF R12), in metres */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
                     "image/tiff": string;
+                    "application/x-bag": string;
                     "image/png": string;
                     "text/plain": string;
                     "application/geo+json": string;
@@ -13474,6 +13584,74 @@ export interface operations {
             };
             /** @description Too much is under way */
             503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getMeasuredCasts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["VehicleCastView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };

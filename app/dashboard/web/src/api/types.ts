@@ -87,6 +87,7 @@ export type NewCasts = Schemas["NewCasts"];
 export type CastRules = Schemas["CastRules"];
 export type MountingSpec = Schemas["MountingSpec"];
 export type MountingView = Complete<Schemas["MountingView"]>;
+export type VehicleCastView = Complete<Schemas["VehicleCastView"]>;
 export type MountingEstimateView = Complete<Schemas["MountingEstimateView"]>;
 export type MountingParameter = Schemas["MountingParameter"];
 export type SoundSpeed = Schemas["SoundSpeed"];

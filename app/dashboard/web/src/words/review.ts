@@ -96,6 +96,12 @@ export const REVIEW = {
     en: "From {before} to {after} the outer beam's depth at {depth} differs by {difference}, more than half the TVU of order {order} ({limit}). A cast between them is missing.",
     pt: "De {before} para {after} a profundidade do feixe exterior a {depth} difere {difference}, mais de metade da TVU da ordem {order} ({limit}). Falta um perfil entre eles.",
   },
+  "casts.measured": { en: "Measured by vehicles", pt: "Medidos por veículos" },
+  "casts.fillIn": { en: "Fill in", pt: "Preencher" },
+  "casts.speeds": {
+    en: "{samples} speeds, ± {sd} m/s",
+    pt: "{samples} velocidades, ± {sd} m/s",
+  },
   "casts.change": { en: "Change…", pt: "Alterar…" },
   "casts.remove": { en: "Remove", pt: "Remover" },
   "casts.name": { en: "Name of the cast", pt: "Nome do perfil" },

@@ -10,6 +10,7 @@ import { selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, Choice, FileButton, Typed } from "../parts/Controls";
 import { numberOf, type PartProps } from "./correctionParts";
+import { MeasuredCasts } from "./MeasuredCasts";
 
 type Rule = CastsView["rule"];
 
@@ -71,6 +72,7 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
       {casts.length > 1 && list.value ? (
         <RuleOf key={list.value.rule} list={list.value} busy={busy} change={change} fault={fault} />
       ) : null}
+      <MeasuredCasts show={show} fault={fault} />
       <CastForm
         found={found}
         form={form}
@@ -84,7 +86,7 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
   );
 }
 
-type Shown = (cast: Cast, name: string, source: string) => void;
+export type Shown = (cast: Cast, name: string, source: string) => void;
 
 /** A time, ISO 8601 in UTC, as it is typed: seconds where there are any. */
 const typedTime = (time: string): string => time.slice(0, 19).replace("T", " ").replace(/:00$/, "");

@@ -1,0 +1,64 @@
+import { type Signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import { api } from "../../api/client";
+import type { VehicleCastView } from "../../api/types";
+import type { Cast } from "../../state/analysis/soundSpeedCast";
+import { count, dayAndTimeUtc, fixed, metres } from "../../state/format";
+import { said } from "../../state/session";
+import { selectedId, view } from "../../state/store";
+import { say } from "../../words/say";
+import { Button } from "../parts/Controls";
+import type { Shown } from "./Casts";
+
+/** What vehicles measured of the sound's speed on their way, as their logs tell; filled in, it can be added as a cast. */
+export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<string> }) {
+  const found = useSignal<readonly VehicleCastView[]>([]);
+  // Logs are imported, and taken back, meanwhile.
+  const changed = useComputed(() => view.value.events.findLast(({ kind }) => kind === "import")?.id);
+  useSignalEffect(() => {
+    const id = selectedId.value;
+    changed.value;
+    if (!id) return;
+    api.measuredCasts(id).then(
+      (casts) => {
+        if (selectedId.peek() === id) found.value = casts;
+      },
+      (error: unknown) => {
+        if (selectedId.peek() === id) fault.value = said(error);
+      },
+    );
+  });
+  if (found.value.length === 0) return null;
+  return (
+    <>
+      <h4>{say("casts.measured")}</h4>
+      <ul>
+        {found.value.map((cast) => (
+          <li key={`${cast.vehicle} ${cast.time}`} data-testid="measured-cast">
+            <span>
+              <b>{cast.vehicle}</b> {about(cast)}
+            </span>
+            <Button
+              id="cast-fill-in"
+              onClick={() =>
+                show({ ...cast, profile: cast.profile as Cast["profile"] }, nameOf(cast), cast.file)
+              }
+            >
+              {say("casts.fillIn")}
+            </Button>
+          </li>
+        ))}
+      </ul>
+    </>
+  );
+}
+
+const nameOf = ({ vehicle, time }: VehicleCastView): string =>
+  `${vehicle} ${time.slice(0, 16).replace("T", " ")}`;
+
+/** When it was measured, how deep it goes, and how well single speeds agree. */
+const about = ({ time, profile, sd_mps, samples }: VehicleCastView): string =>
+  [
+    dayAndTimeUtc(new Date(time)),
+    say("casts.downTo", { depth: metres(profile.at(-1)?.[0]) }),
+    say("casts.speeds", { samples: count(samples), sd: fixed(sd_mps, 1) }),
+  ].join(" · ");
