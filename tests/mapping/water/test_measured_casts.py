@@ -16,7 +16,7 @@ def dive(
     begin_s: float, depth_m: FloatArray, rng: np.random.Generator | None = None, every_s: float = 1.0
 ) -> SoundSpeedSamples:
     noise = np.zeros(len(depth_m)) if rng is None else 0.3 * rng.standard_normal(len(depth_m))
-    time_s = begin_s + every_s * np.arange(len(depth_m))
+    time_s = begin_s + every_s * np.arange(len(depth_m), dtype=np.float64)
     place = np.full(len(depth_m), 41.185), np.full(len(depth_m), -8.705)
     return SoundSpeedSamples(time_s, depth_m, speed_mps(depth_m) + noise, *place)
 
