@@ -129,7 +129,12 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
       made.setSize({ width: Math.max(160, element.clientWidth), height }),
     );
     watcher.observe(element);
-    const unwatched = printing.subscribe(() => made.redraw(false));
+    let paper = printing.peek();
+    const unwatched = printing.subscribe((now) => {
+      // It is told at once what there is; nothing may be drawn before the first values are there.
+      if (now !== paper) made.redraw(false);
+      paper = now;
+    });
     return () => {
       unwatched();
       watcher.disconnect();
