@@ -5,7 +5,6 @@ are, long before the vehicle is there. So nobody waits for a decision, for a slo
 """
 
 import asyncio
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +13,9 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.free_space import FreeSpace
 from app.missions.flight.decisions.deciding import Decider, moved_on, place_ahead
-from app.missions.flight.decisions.decision import Decision
-from app.missions.flight.decisions.leg import Leg, Place
+from app.missions.flight.decisions.leg import Place
 from app.missions.flight.decisions.step_maps import StepMaps
+from app.missions.flight.legs.assignment import LegAssignment
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.demand import LegDemand
 from app.missions.flight.legs.dispatch import Dispatch
@@ -33,7 +32,6 @@ from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.way import planned_way_m
 from app.missions.team import Member, WithdrawalCause
-from app.missions.views.mission import Level
 
 
 class OwnLegs:
@@ -68,10 +66,11 @@ class OwnLegs:
         self._time_scale = time_scale
         self._range = energy_range
         self._orders = orders
-        self._demand = LegDemand(live, decider, time_scale)
-        self._end = SurveyEnd(live, decider, self._demand, energy_range, time_scale)
+        self._demand = LegDemand(live, lambda: decider.takes_s, time_scale)
+        self._end = SurveyEnd(live, decider.planner, self._demand, energy_range, time_scale)
         self._length = LengthChange(live, decider.planner, leg_commit, dispatch)
         self._spacing = LegSpacing(live, constraints)
+        self._assignment = LegAssignment(live, self._demand, self._spacing, leg_commit, energy_range, dispatch.unflown)
         self._exchange = LegExchange(live, decider, leg_commit, energy_range, time_scale)
 
     @property
@@ -179,10 +178,9 @@ class OwnLegs:
         all_flown = not any((m.ordered or m.ahead) and not m.misses for m in live.team.plannable)
         planner = self._decider.planner
         memory, committed = planner.snapshot(), False
-        not_given: dict[str, list[FloatArray]] = {}
-        self._decider.attempt = self._spacing.most_refusals(names)
-        legs = self._demand.legs_at_once(getting)
-        decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=legs)
+        not_assigned: dict[str, list[FloatArray]] = {}
+        legs, attempt = self._demand.legs_at_once(getting), self._spacing.most_refusals(names)
+        decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=legs, attempt=attempt)
         if self._spec.budget != budget:
             # It was decided for what was left of another length.
             planner.restore(memory)
@@ -196,82 +194,23 @@ class OwnLegs:
         for later, decision in enumerate(decisions):
             starts = {place.vehicle: place.en_m for place in places}
             places = moved_on(places, decision)
-            given = await self._commit(decision, starts, {name: number + later for name, number in numbers.items()})
-            committed |= bool(given)
-            for leg in self._not_given(decision, given):
-                not_given.setdefault(leg.vehicle, []).append(leg.target_m[:2])
+            numbers_now = {name: number + later for name, number in numbers.items()}
+            assigned_m = await self._assignment.assign(decision, starts, numbers_now)
+            committed |= bool(assigned_m)
+            for leg in self._assignment.not_assigned(decision, assigned_m):
+                not_assigned.setdefault(leg.vehicle, []).append(leg.target_m[:2])
             # Who did not get this leg gets none that goes on from it.
-            numbers = {name: number for name, number in numbers.items() if self._has_leg(name, number + later)}
+            numbers = {name: numbers[name] for name, now in numbers_now.items() if self._assignment.has_leg(name, now)}
         # What it plans is still to be flown.
         if not committed:
             planner.restore(memory)
         else:
-            for name, ends in not_given.items():
+            for name, ends in not_assigned.items():
                 planner.put_back(name, np.array(ends))
-            if not_given:
+            if not_assigned:
                 # What was stored with the legs has these as flown, and a restart would go on from that.
                 await self._leg_commit.remember(planner.snapshot())
         self._maps.begin()
-
-    def _not_given(self, decision: Decision, given_m: dict[str, FloatArray]) -> Iterable[Leg]:
-        """Return the planned legs of a decision that no vehicle got, and that nobody is led to in another way."""
-        for leg in decision.legs:
-            end_m = given_m.get(leg.vehicle)
-            gets_it = end_m is not None and np.array_equal(end_m, leg.target_m)
-            is_led_round = self._dispatch.unflown.is_barred_end(leg.vehicle, leg.target_m[:2])
-            if not leg.unplanned and not leg.refusal and not gets_it and not is_led_round:
-                yield leg
-
-    async def _commit(
-        self, decision: Decision, starts_m: dict[str, FloatArray], numbers: dict[str, int]
-    ) -> dict[str, FloatArray]:
-        """Commit the legs of a decision that can be flown from where they were to begin; returns their ends, (3,)."""
-        live = self._live
-        begun = [
-            leg
-            for leg in decision.legs
-            if leg.vehicle in numbers
-            and (member := live.team.get(leg.vehicle)) is not None
-            and member.controllable
-            and member.legs < numbers[leg.vehicle]
-            and self._demand.wants_legs(member)
-            and not self._dispatch.unflown.is_barred(leg.vehicle)
-            and self._begins_at(member, starts_m[leg.vehicle])
-            and self._comes_home_after(member, leg)
-        ]
-        wished, decision = decision.legs, self._spacing.apart(replace(decision, legs=begun))
-        self._demand.look_later({leg.vehicle for leg in decision.legs if leg.refusal})
-        legs = [leg for leg in decision.legs if not leg.refusal]
-        if legs:
-            for leg in wished:
-                if not leg.refusal and leg.vehicle in numbers and self._dispatch.unflown.is_barred(leg.vehicle):
-                    # The planner takes it as flown, and it goes on from legs that are not.
-                    self._dispatch.unflown.add_barred(leg.vehicle, [leg.target_m[:2]])
-            await self._leg_commit.commit(replace(decision, legs=legs), numbers)
-            live.changed.set()
-        elif self._spacing.is_first_refusal(decision):
-            for note in decision.notes:
-                await live.journal.log(Level.WARNING, "safety", note)
-        return {leg.vehicle: leg.target_m for leg in legs}
-
-    def _comes_home_after(self, member: Member, leg: Leg) -> bool:
-        """Whether a vehicle's energy lasts for a leg and its way home after it; where not, it goes home."""
-        if leg.refusal or self._range.allows(member, leg.target_m[:2]):
-            return True
-        if not member.ahead and not member.ordered:
-            self._live.withdraw(member, Response.RETURN, "its energy lasts for its way home and for no further leg")
-        # It flies the legs it has. Looked at again at once it would be decided for all that time, and others wait.
-        self._demand.look_later({member.name})
-        return False
-
-    def _has_leg(self, name: str, number: int) -> bool:
-        member = self._live.team.get(name)
-        return member is not None and member.legs == number
-
-    def _begins_at(self, member: Member, start_m: FloatArray) -> bool:
-        if not member.busy and not member.ahead:
-            return True  # it is there or near it, and its way is looked at once more before it is sent
-        return bool(np.array_equal(member.last_end_m(self._live.frame), start_m))
 
     def _place(self, member: Member, *, moving: bool) -> Place:
         left_m = planned_way_m(self._spec, member.way_left_m(self._spec)) if self._demand.wants_legs(member) else 0.0

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from app.missions.flight.decisions.deciding import Decider
+from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.flight.decisions.decision import Decision
 from app.missions.flight.legs.demand import LegDemand
 from app.missions.flight.legs.energy_range import EnergyRange
@@ -41,10 +41,15 @@ class SurveyEnd:
     """
 
     def __init__(
-        self, live: LiveMission, decider: Decider, demand: LegDemand, energy_range: EnergyRange, time_scale: float
+        self,
+        live: LiveMission,
+        planner: OrderedPlanner,
+        demand: LegDemand,
+        energy_range: EnergyRange,
+        time_scale: float,
     ) -> None:
         self._live = live
-        self._decider = decider
+        self._planner = planner
         self._demand = demand
         self._range = energy_range
         self._time_scale = time_scale
@@ -175,7 +180,7 @@ class SurveyEnd:
         """Return why nobody goes on, in words, and what that says of lines that were asked for."""
         if not self._spec.lines_asked_for:
             return words
-        planner = self._decider.planner.planner
+        planner = self._planner.planner
         left_m, by_name = planner.lines_left_m(), planner.lines_left()
         named = {name: one_m for name, one_m in by_name.items() if one_m > LEAST_TOLD_M}
         if left_m <= LEAST_TOLD_M or (by_name and not named):

@@ -44,8 +44,6 @@ class Decider:
     ----------
     takes_s
         How long the next decision of one leg will take, on the wall clock, as the last ones did.
-    attempt
-        How often in a row legs were decided that a vehicle could not fly.
     """
 
     def __init__(
@@ -58,7 +56,6 @@ class Decider:
         self._told: dict[str, str] = {}
         self.planner = planner
         self.takes_s = EXPECTED_DECISION_S
-        self.attempt = 0
 
     async def decide(
         self,
@@ -67,10 +64,20 @@ class Decider:
         task: SearchTask | None = None,
         legs: int = 1,
         most: Mapping[str, int] | None = None,
+        attempt: int = 0,
     ) -> list[Decision]:
-        """Bring the map up to date, then decide legs from this number on, so many for each vehicle that gets any.
+        """Bring the map up to date, then decide legs from this number on.
 
-        ``task`` is what a search is about; ``most`` says of vehicles that they get so many only.
+        Parameters
+        ----------
+        task
+            What a search is about.
+        legs
+            How many each vehicle gets that gets any.
+        most
+            Says of vehicles that they get so many only.
+        attempt
+            How often in a row legs were decided that a vehicle could not fly.
         """
         live = self._live
         started_s = asyncio.get_running_loop().time()
@@ -83,7 +90,7 @@ class Decider:
 
         def decided(number: int, here: list[Place], known: Knowledge) -> Decision:
             known = replace(known, water_level_m=live.gate.corrections.water_level_m(now().timestamp()))
-            return decide(number, live.spec, self._constraints, self.planner, here, known, self.attempt)
+            return decide(number, live.spec, self._constraints, self.planner, here, known, attempt)
 
         def work() -> list[Decision]:
             coverers = live.spec.planner.name in COVERERS
@@ -111,11 +118,11 @@ class Decider:
         return decisions
 
     async def decide_to_fly(
-        self, number: int, places: list[Place], task: SearchTask | None = None, legs: int = 1
+        self, number: int, places: list[Place], task: SearchTask | None = None, legs: int = 1, attempt: int = 0
     ) -> list[Decision]:
-        """Decide legs of which at least one is flown; none when nobody may go anywhere, which is told once."""
+        """Decide legs as by :meth:`decide` of which one is flown; none where nobody may go anywhere, told once."""
         memory = self.planner.snapshot()
-        decisions = await self.decide(number, places, task, legs)
+        decisions = await self.decide(number, places, task, legs, attempt=attempt)
         refusals = {leg.vehicle: leg.refusal for leg in decisions[0].legs if leg.refusal}
         if len(refusals) < len(decisions[0].legs) or not decisions[0].legs:
             self._told = {}

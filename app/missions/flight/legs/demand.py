@@ -2,12 +2,12 @@
 
 import asyncio
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
 from app.exploration.planners import COVERERS
-from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider
+from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.way import least_way_m
@@ -39,15 +39,15 @@ class LegDemand:
 
     Parameters
     ----------
-    decider
-        Tells how long decisions take.
+    decision_s
+        Returns how long the next decision of one leg will take, on the wall clock.
     time_scale
         How much faster than the wall clock the vehicles live.
     """
 
-    def __init__(self, live: LiveMission, decider: Decider, time_scale: float) -> None:
+    def __init__(self, live: LiveMission, decision_s: Callable[[], float], time_scale: float) -> None:
         self._live = live
-        self._decider = decider
+        self._decision_s = decision_s
         self._time_scale = time_scale
         self.watched = bool(live.spec.targets) or live.spec.surface_policy is not None
         """Whether decisions follow targets, or what vehicles say of their position."""
@@ -109,7 +109,7 @@ class LegDemand:
 
     def is_unhurried(self, members: Iterable[Member]) -> bool:
         """Whether the legs of all of some vehicles last for several decisions more."""
-        unhurried_s = 2.0 * DECISIONS_AHEAD * self._decider.takes_s
+        unhurried_s = 2.0 * DECISIONS_AHEAD * self._decision_s()
         return not self.watched and all(self._lasts_s(member) > unhurried_s for member in members)
 
     def legs_at_once(self, members: Iterable[Member]) -> int:
@@ -117,7 +117,7 @@ class LegDemand:
         if self.watched:
             return 1
         fastest_mps = max(self._spec.speed_of(member.spec) for member in self._live.team)
-        way_m = (self._lead_s if self.measured else DECISIONS_AHEAD * self._decider.takes_s) * self._time_scale
+        way_m = (self._lead_s if self.measured else DECISIONS_AHEAD * self._decision_s()) * self._time_scale
         way_m *= fastest_mps
         idle = any(not member.ordered and not member.ahead for member in members)
         return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1 + self._ahead * idle), MOST_AHEAD)
@@ -147,21 +147,21 @@ class LegDemand:
             return self._lasts_s(member) < self._lead_s
         if len(member.ahead) < self._ahead:
             return True
-        return not self.watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s
+        return not self.watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decision_s()
 
     @property
     def _lead_s(self) -> float:
         """How long before a vehicle's legs end the next one is decided, on the wall clock, where they are measured."""
         # A vehicle rather circles for a slow decision than gets all the next ones from what is not measured yet.
         shortest_s = LEAD_S / self._time_scale
-        return shortest_s + DECISIONS_AHEAD * min(self._decider.takes_s, shortest_s)
+        return shortest_s + DECISIONS_AHEAD * min(self._decision_s(), shortest_s)
 
     def _will_need_leg(self, member: Member) -> bool:
         if self.measured:
             return self._lasts_s(member) < SOON * self._lead_s
         # Where decisions are slow one for everybody takes the time of one for somebody.
-        others_s = len(self._live.team.plannable) * self._decider.takes_s
-        if not self.watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s + others_s:
+        others_s = len(self._live.team.plannable) * self._decision_s()
+        if not self.watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decision_s() + others_s:
             return True
         left_m = self._left_of_leg_m(member)
         return len(member.ahead) <= self._ahead and left_m <= HARDLY_BEGUN * self._spec.limits.max_step_m
