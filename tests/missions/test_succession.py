@@ -345,11 +345,11 @@ async def test_the_way_in_takes_nothing_of_a_missions_length(service: MissionSer
     await rover.post()
     assert await rover.poll(5.0)
     [member] = live.team
-    assert member.committed_m < 60.0, "it comes from 60 m away"
+    assert member.committed.way_m < 60.0, "it comes from 60 m away"
     with suppress(ConflictError):
         while await state_of(service, mission.id) is S.RUNNING:
             await rover.poll(0.1)
-    assert 25.0 < member.committed_m < 40.0, "as much as was asked for, and a last leg"
+    assert 25.0 < member.committed.way_m < 40.0, "as much as was asked for, and a last leg"
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ crash between any two moments loses nothing and repeats nothing but the sending,
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -187,9 +188,7 @@ class Runner:
         """Take up what was last committed: the planner's memory, and the legs that were not flown; whether any was."""
         live = self._live
         for member in live.team:
-            member.ahead.clear()
-            member.set_order(None)
-            member.status = None
+            member.drop_legs()
         async with live.database.reading() as session:
             step = await mission_queries.last_step(session, live.id)
             if step is None:
@@ -228,8 +227,10 @@ class Runner:
         member: Member, last: Mapping[str, int], way_m: Mapping[str, float], spared: Mapping[str, int]
     ) -> None:
         """Let a vehicle have the legs that were committed for it, and how long they are together."""
-        member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
-        member.spared = spared[member.name]
+        name = member.name
+        member.committed = replace(
+            member.committed, legs=last.get(name, 0), way_m=way_m.get(name, 0.0), spared=spared[name]
+        )
 
     async def _remember(self, memory: bytes) -> None:
         """Let the planner take up what it had in mind; where it cannot read that it begins anew, on the same map."""

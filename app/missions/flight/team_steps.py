@@ -86,9 +86,7 @@ class TeamSteps:
                 if decision is None:
                     continue
             for member in live.team.surveying:
-                member.set_order(None)
-                member.status = None
-                member.ahead.clear()
+                member.drop_legs()
             number = live.header.step + 1
             await self._leg_commit.commit(decision, {leg.vehicle: number for leg in decision.legs})
             await self._dispatch.begin()

@@ -8,7 +8,7 @@ from app.mapping.water.tide_files import parse_tid
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
-from app.missions.flown import Flown, Phase
+from app.missions.flown import Flown
 from app.missions.live.header import StoredMission
 from app.missions.live.journals.journal import RISES, Counts
 from app.missions.live.mission import LiveMission, builder_of
@@ -110,7 +110,7 @@ async def take_up(
         member.withdrawal = Withdrawal.recall(vehicle.withdrawal)
         if ended:
             member.energy.take_level(level_pct)
-            member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
+            member.come_to_rest()
         if vehicle.left_at is not None:
             live.team.leave(member.name, vehicle.left_at)
     live.waypoints.show_rows(waypoints)

@@ -19,7 +19,6 @@ from app.mapping.swath.pings import Pings, reach_m
 from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetEvent, VehicleReport
-from app.missions.flown import Phase
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
@@ -42,7 +41,6 @@ from app.missions.maps.tiles import TileCache
 from app.missions.pings.gate import PingGate
 from app.missions.pings.store import PingStore
 from app.missions.recovery.energy import Energy
-from app.missions.recovery.failsafes import STRENGTH
 from app.missions.search.mates import Mates
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
@@ -283,7 +281,7 @@ class LiveMission:
         self.running_since_s = None
         self.standstill = ""
         for member in self.team:
-            member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
+            member.come_to_rest()
 
     def stand_still(self, why: str) -> None:
         """Note why no vehicle may be sent anywhere; empty: at least one may again."""
@@ -305,7 +303,7 @@ class LiveMission:
         self.header.state = MissionState.RUNNING
         self.halted = False
         for member in self.team:
-            member.engaged = False
+            member.disengage()
             member.refusal = ""
 
     def enter(self, state: MissionState, reason: str, changed_at: datetime | None = None) -> None:
@@ -352,7 +350,7 @@ class LiveMission:
             if member.name in left_m:
                 member.flown.left_m = left_m[member.name]
             if budget.minutes is None:
-                member.late_m = 0.0
+                member.committed.late_m = 0.0
             elif member.legs:
                 member.count_late(self.spec, self.frame)
         self.changed.set()
@@ -403,13 +401,10 @@ class LiveMission:
 
         The flight sends it where the response leads. ``asked``: a person wants it.
         """
-        before = member.withdrawal
-        if before is not None and (STRENGTH[before.response] >= STRENGTH[response] or before.over):
-            return False
-        member.withdrawal = Withdrawal(response, why, asked=asked, cause=cause)
-        member.pursuing = None
-        self.changed.set()
-        return True
+        withdraws = member.withdraw(Withdrawal(response, why, asked=asked, cause=cause))
+        if withdraws:
+            self.changed.set()
+        return withdraws
 
     def refuse_ending(self) -> None:
         """Raise ConflictError while everybody goes home because the mission was finished or aborted."""

@@ -12,7 +12,6 @@ from app.missions.clock import now
 from app.missions.fleet.interface import (
     FleetEvent,
     LinkReport,
-    LinkState,
     PingReport,
     RangeReport,
     RestartReport,
@@ -120,13 +119,10 @@ class VehicleReports:
                 self._ranges.note(event, member.report.time_s if member.report else None)
                 return
             case LinkReport():
-                member.link = event.state
-                if event.state in (LinkState.HEARD, LinkState.READY):
-                    # It can be reached but follows nothing of ours (any more): the loop engages it again.
-                    member.engaged = False
+                member.note_link(event.state)
             case RestartReport():
                 # The link may lead it again at once. The loop asks all the same, and says when it follows.
-                member.engaged = False
+                member.disengage()
                 words = f"{event.vehicle}: {event.reason}"
                 line = self._journal.alarm_line(AlarmKind.VEHICLE_RESTARTED, words, vehicle=event.vehicle)
                 self._journal.note_line(line)
@@ -188,7 +184,8 @@ class VehicleReports:
             return
         if 0.0 < passed_s <= LONGEST_SILENCE_S:
             energy.pass_time(passed_s, report.speed_mps)
-            _count_submersion(member, report.position.depth_m, passed_s, policy)
+            at_surface, stay_s = report.position.depth_m <= SURFACE_M, 0.0 if policy is None else policy.stay_s
+            member.fixes.pass_time(passed_s, at_surface=at_surface, stay_s=stay_s)
         member.flown.used_s = energy.used_s
 
     def _phase(self, member: Member, way_left_m: float) -> Phase:
@@ -231,29 +228,14 @@ class VehicleReports:
         member.status = event.status
         member.reason = event.reason
         if event.status is WaypointStatus.REACHED:
-            member.misses = 0
-            if member.flies_survey:
-                member.flown.reach_leg()
+            member.reach_leg()
             took_s = asyncio.get_running_loop().time() - member.leg.began_s
             before_s = took_s if self.leg_s is None else self.leg_s
             self.leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
         elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
-            member.misses += 1
-            if member.flies_survey:
-                member.flown.miss_leg()
+            member.miss_leg()
         self._journal.waypoint(event)
         self._waypoints.take(event)
-
-
-def _count_submersion(member: Member, depth_m: float, passed_s: float, policy: SurfacePolicy | None) -> None:
-    """Count how long a vehicle has been under water, or up again; what counts as a fix the policy says."""
-    if depth_m > SURFACE_M:
-        member.fixes.surfaced_s = 0.0
-        member.fixes.submerged_s += passed_s
-        return
-    member.fixes.surfaced_s += passed_s
-    if policy is None or member.fixes.surfaced_s >= policy.stay_s:
-        member.fixes.submerged_s = 0.0
 
 
 def phase_of(withdrawal: Withdrawal) -> Phase:

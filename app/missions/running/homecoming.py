@@ -82,10 +82,9 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
             await mission_queries.keep_withdrawal(session, live.id, name, None)
         if member.is_home:
             member.energy.renew()
-        member.withdrawal = None
+        member.survey_again()
         member.flown.phase = Phase.TRANSIT if live.header.state is MissionState.RUNNING else Phase.STOPPED
-        member.ahead.clear()
-        member.set_order(None)
+        member.drop_legs()
     await live.journal.log(Level.INFO, "recovery", f"{name} goes on with the survey", vehicle=name, actor=actor)
     live.changed.set()
     live.publish_summary()

@@ -173,7 +173,7 @@ async def _standings(session: AsyncSession, live: LiveMission) -> Mapping[str, _
         stored = np.array([[row.east_m, row.north_m] for row in rows if row.vehicle == member.name]).reshape(-1, 2)
         ends_m = member.legs_ahead_m() if counted else stored
         open_m = np.vstack([member.place_m(live.frame), ends_m]) if len(ends_m) and flies else np.zeros((0, 2))
-        whole_m = member.committed_m if counted else way_m.get(member.name, 0.0)
+        whole_m = member.committed.way_m if counted else way_m.get(member.name, 0.0)
         last = member.legs if counted else newest.get(member.name, 0)
         come_m = max(whole_m - _length_m(open_m), 0.0)
         found[member.name] = _Standing(last, open_m, come_m, member.flown.survey_s)

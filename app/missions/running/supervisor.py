@@ -304,7 +304,7 @@ class MissionSupervisor:
 
     async def stop_vehicle(self, live: LiveMission, member: Member) -> StopReceipt:
         """Stop one vehicle and write down what it answered."""
-        member.engaged = False
+        member.disengage()
         stop = await self._hub.stop(member.key)
         await self.log_stops(live, [stop])
         return stop
@@ -318,7 +318,7 @@ class MissionSupervisor:
             and (not only_engaged or self._hub.info(member.key).state is LinkState.ENGAGED)
         ]
         for member in mine:
-            member.engaged = False
+            member.disengage()
         live.changed.set()
         return list(await asyncio.gather(*(self._hub.stop(member.key) for member in mine)))
 

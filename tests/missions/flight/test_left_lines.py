@@ -60,7 +60,7 @@ async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
         assert not LineString(again).buffer(1.0).covers(LineString(ends[:3])), "the first one had flown that"
     else:
         # Legs that it did not begin take nothing of its way.
-        assert live.team.named("a").spared == len(missed) - 1
+        assert live.team.named("a").committed.spared == len(missed) - 1
 
 
 @pytest.mark.parametrize(("budget", "left"), [({"minutes": 90}, "90 min"), ({"km_per_vehicle": 2.0}, "2.0 km")])

@@ -36,9 +36,9 @@ class Ended:
     b: Member
 
     def has_flown_all(self, member: Member) -> None:
-        member.legs = self.live.spec.steps
+        member.committed.legs = self.live.spec.steps
         member.ahead.clear()
-        member.set_order(None)
+        member.drop_order()
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ async def test_who_gets_no_leg_is_done_only_once_all_that_was_being_measured_was
     ended = await survey()
     end, a = ended.end, ended.a
     ended.has_flown_all(ended.b)
-    a.set_order(None)
+    a.drop_order()
     end.note_decided([a], NOTHING_FOR_A, set(), all_flown=False)
     assert not end.is_reached(), "others still measured"
     assert end.at_rest([a]) == {"a"}
@@ -117,7 +117,7 @@ async def test_who_has_flown_its_way_goes_home_and_who_gets_no_further_line_with
     assert ended.end.flown_out() == [ended.b]
     ended.end.call_home(["a"])
     assert ended.a.withdrawal is None, "it flies"
-    ended.a.set_order(None)
+    ended.a.drop_order()
     ended.end.call_home(["a"])
     assert ended.a.withdrawal is not None
     assert (ended.a.withdrawal.response, ended.a.withdrawal.done) == (Response.RETURN, True)

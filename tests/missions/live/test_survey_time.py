@@ -35,7 +35,7 @@ class UnderWay:
         self.live = live
         self.member: Member = live.team.join(live.spec.vehicles[0], 0)
         self.member.link = LinkState.ENGAGED
-        self.member.legs, self.member.committed_m = 1, 100.0
+        self.member.committed.legs, self.member.committed.way_m = 1, 100.0
         self.member.target_m = np.array([10.0, 110.0])
         self.member.order = WaypointOrder(live.id, 1, "a", self.at(110.0), SPEED_MPS, 3.0, 1.0)
         self.member.status = Status.ACKNOWLEDGED
@@ -149,10 +149,10 @@ async def test_time_that_is_not_spent_surveying_does_not_count(under_way: Made, 
     member = vehicle.member
     member.surfacing = how == "surfacing"
     member.withdrawal = Withdrawal(Response.HOLD, "a person wants it", asked=True) if how == "held" else None
-    member.legs = 0 if how == "on its way there" else 1
+    member.committed.legs = 0 if how == "on its way there" else 1
     for time_s in (30.0, 60.0):
         vehicle.reports(time_s, 10.0, standing=how == "standing", running=how != "paused")
-    member.surfacing, member.withdrawal, member.legs = False, None, 1
+    member.surfacing, member.withdrawal, member.committed.legs = False, None, 1
     vehicle.reports(60.0, 10.0)
     assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0)
     assert member.flown.phase is Phase.SURVEY
@@ -189,7 +189,7 @@ async def test_vehicles_that_wait_for_each_other_all_the_time_survey_for_their_m
     # minute for each of two or three. Waiting that does not count made 22 minutes of the four.
     assert np.median(survey_s) < 240.0 + 180.0, survey_s
     assert survey_s.min() > 240.0 - 30.0, survey_s
-    assert max(member.committed_m for member in live.team) < 240.0 * live.spec.speed_mps + 1.0
+    assert max(member.committed.way_m for member in live.team) < 240.0 * live.spec.speed_mps + 1.0
 
 
 @pytest.mark.parametrize("budget", [{"minutes": MINUTES}, {"km_per_vehicle": WHOLE_M / 1000.0}])
@@ -261,7 +261,7 @@ async def test_the_way_home_is_not_left_of_the_survey(under_way: Made) -> None:
 async def test_who_is_held_or_home_waits_for_no_decision(under_way: Callable[..., Awaitable[UnderWay]]) -> None:
     vehicle = await under_way(minutes=MINUTES)
     member = vehicle.member
-    member.set_order(None)
+    member.drop_order()
     vehicle.reports(10.0, 20.0)
     assert member.flown.idle_s == 10.0
     for response in (Response.HOLD, Response.RETURN):
@@ -288,7 +288,7 @@ async def test_what_was_flown_is_stored_with_the_track(under_way: Made, service:
 
 async def test_while_the_service_was_down_nobody_was_idle(under_way: Made) -> None:
     vehicle = await under_way()
-    vehicle.member.set_order(None)
+    vehicle.member.drop_order()
     vehicle.reports(5.0, 10.0)
     assert vehicle.member.flown.idle_s == 5.0
     # As it is known after a restart: where it was last, and nothing of its clock.

@@ -44,7 +44,7 @@ async def started(service: MissionService, spec: MissionSpec) -> LiveMission:
 
 
 def come_m(member: Member) -> float:
-    return member.committed_m - member.way_ahead_m(FRAME)
+    return member.committed.way_m - member.way_ahead_m(FRAME)
 
 
 async def until_flown_m(live: LiveMission, metres: float) -> None:
@@ -200,9 +200,9 @@ async def test_who_is_home_is_named_and_sent_on(service: MissionService) -> None
     assert (await lines_of(live))[0].endswith("changed by Ana; fast had flown all: resume who is to survey on")
     assert slow.withdrawal is None
     await until(lambda: fast.is_home, "it is home")
-    before_m = fast.committed_m
+    before_m = fast.committed.way_m
     await service.send_on(live, "fast", "Ana")
-    await until(lambda: fast.committed_m > before_m + 50.0, "it surveys on")
+    await until(lambda: fast.committed.way_m > before_m + 50.0, "it surveys on")
     ended = await until_state(service, live.id, MissionState.FINISHED)
     assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
 

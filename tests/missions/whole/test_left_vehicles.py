@@ -159,7 +159,7 @@ async def test_a_vehicle_that_left_before_a_restart_comes_back_with_its_own_numb
     await until(lambda: live.team.members["b"].engaged, "b follows")
     await service.team_changes.rejoin(live, "a", actor="Ana")
     assert live.team.members["a"].legs == flown
-    assert live.team.members["a"].committed_m > 0.0
+    assert live.team.members["a"].committed.way_m > 0.0
     await until(lambda: live.team.members["a"].legs > flown + 2, "a surveys again")
     assert live.header.state is MissionState.RUNNING
     await act(service, mission, "abort", actor="Ana")

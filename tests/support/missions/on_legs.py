@@ -6,7 +6,7 @@ import numpy as np
 
 from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointOrder, WaypointStatus
 from app.missions.live.mission import LiveMission
-from app.missions.team import CommittedLeg, Member
+from app.missions.team import CommittedLeg, CommittedWay, Member
 
 Place = tuple[float, float]
 """East and north in the mission's frame, metres."""
@@ -25,7 +25,8 @@ def put_on_legs(live: LiveMission, name: str, here_m: Place, ends_m: Sequence[Pl
     member.engaged, member.link = True, LinkState.ENGAGED
     member.report = VehicleReport(name, 0.0, position(live, here_m))
     legs = [CommittedLeg(n, position(live, end_m), np.array(end_m)) for n, end_m in enumerate(ends_m, 1)]
-    member.legs, member.committed_m = len(legs), float(np.hypot(*np.diff([here_m, *ends_m], axis=0).T).sum())
+    way_m = float(np.hypot(*np.diff([here_m, *ends_m], axis=0).T).sum())
+    member.committed = CommittedWay(len(legs), way_m)
     member.ahead[:] = legs[1:]
     if legs:
         order = WaypointOrder(live.id, 1, name, legs[0].position, 1.0, 3.0, 1.0)

@@ -92,8 +92,7 @@ class Asides:
         if member.waits_m is None:
             self._led.pop(member.name, None)  # it refused
         elif begins and because is Because.VEHICLE:
-            member.asides += 1
-            member.lets_pass = member.asides <= MOST_ASIDES
+            member.step_aside(MOST_ASIDES)
         return begins and member.waits_m is not None
 
     async def lead_on(self, member: Member) -> None:
@@ -103,8 +102,8 @@ class Asides:
             return
         del self._led[member.name]
         if aside.because is not Because.VEHICLE or member.lets_pass:
-            member.leg.began_s += asyncio.get_running_loop().time() - aside.since_s
-        member.waits_m, member.lets_pass = None, False
+            member.leg.stand_still(asyncio.get_running_loop().time() - aside.since_s)
+        member.go_on()
         await self._dispatch.send(member)
         self._live.changed.set()  # its time for the leg goes on
 

@@ -108,7 +108,7 @@ class LegCommit:
         for row, leg, member in zip(rows, decision.legs, getting, strict=True):
             now_of_name = live.team.get(row.vehicle) or live.team.departed.get(row.vehicle)
             if now_of_name is not None:
-                now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
+                now_of_name.committed.commit(row.step)  # it may have left, or come back, meanwhile
             if member is None or member is not now_of_name or member.left_at is not None:
                 continue
             if not leg.unplanned:
@@ -116,7 +116,7 @@ class LegCommit:
                 if not member.ahead and member.target_m is not None and member.status is WaypointStatus.REACHED:
                     # It was there a little before the end of its last leg, all of which is counted already.
                     begin_m = member.target_m
-                member.committed_m += way_m([begin_m, leg.target_m[:2]], live.spec)
+                member.committed.way_m += way_m([begin_m, leg.target_m[:2]], live.spec)
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
             elif member.withdrawal is None:  # it may have been called home meanwhile
@@ -165,19 +165,13 @@ class LegCommit:
         """
         member.ahead.clear()
         for en_m, depth_m in corners:
-            member.legs += 1
+            member.committed.commit(member.legs + 1)
             place = self._position(float(en_m[0]), float(en_m[1]), depth_m)
             member.ahead.append(CommittedLeg(member.legs, place, np.asarray(en_m, dtype=np.float64), homeward=True))
 
     def begin_next(self, member: Member) -> None:
         """Make a vehicle's next leg its order."""
-        leg = member.ahead.pop(0)
-        if member.target_m is not None and member.status is WaypointStatus.REACHED and member.waits_m is None:
-            member.leg.start_m = member.target_m
-        elif member.report is not None:
-            member.leg.start_m = member.place_m(self._live.frame)
-        member.fixes.risings += leg.surfacing and not member.surfacing
-        member.surfacing = leg.surfacing
+        leg = member.take_next_leg(self._live.frame)
         self._order(leg, member)
         self._live.waypoints.show(leg.number, member.name, leg.position, leg.target_m)
 
@@ -238,7 +232,6 @@ class LegCommit:
             bottom=bottom,
         )
         member.set_order(order, target)
-        member.status = WaypointStatus.PLANNED
 
     def followed_to_m(self, member: Member, end_m: FloatArray) -> FloatArray:
         """Return how far a vehicle goes on its leg that gets no further order, (2,): beyond the end where it is led."""

@@ -67,7 +67,7 @@ class Dispatch:
                 if member.ordered and not member.busy:
                     member.leg.began_s = now_s  # it is out of reach
                 elif member.left_alone:
-                    member.leg.began_s += now_s - looked_s
+                    member.leg.stand_still(now_s - looked_s)
             looked_s = now_s
             under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy and not m.left_alone}
             late = await self.settle_late()
@@ -139,7 +139,7 @@ class Dispatch:
             log.info("a vehicle would not hold", vehicle=member.name, error=str(error))
             return
         east, north = self._live.frame.to_local(order.position.lat_deg, order.position.lon_deg)
-        member.waits_m = np.array([float(east), float(north)])
+        member.wait_at(np.array([float(east), float(north)]))
         self._live.publish_summary()
 
     async def begin(self) -> None:
@@ -153,8 +153,7 @@ class Dispatch:
                 await self.drop_ahead(member, f"from where it is {barred}")
                 continue
             self._leg_commit.begin_next(member)
-            member.leg.began_s = asyncio.get_running_loop().time()
-            member.leg.allowed_s = leg_allowed_s(self._live, member)
+            member.leg.begin(asyncio.get_running_loop().time(), leg_allowed_s(self._live, member))
             self._refusals.pop(member.name, None)
             if member.engaged:
                 beginning.append(self.send(member))
@@ -167,7 +166,7 @@ class Dispatch:
         try:
             await self._hub.order(member.key, member.order)
         except VehicleRefusedError as error:
-            member.engaged = False
+            member.disengage()
             before = self._refusals.get(member.name, 0)
             self._refusals[member.name] = before + 1
             if not before:
@@ -194,11 +193,8 @@ class Dispatch:
         """End the leg that a vehicle flies, and those after it; returns where they were to end, each (2,)."""
         ends = [member.target_m] if member.ordered and member.target_m is not None else []
         if member.ordered:
-            misses, flown = member.misses, member.flown
-            missed, missed_last = flown.legs_missed, flown.missed_last
-            self.settle(member, WaypointStatus.MISSED, reason)
-            # It would have got there.
-            member.misses, flown.legs_missed, flown.missed_last = misses, missed, missed_last
+            with member.counting_no_misses():
+                self.settle(member, WaypointStatus.MISSED, reason)
         return self._note_given_up(member, [*ends, *self._spare(member, ends, reason)])
 
     def leave_line(self, member: Member, reason: str) -> None:
@@ -233,8 +229,7 @@ class Dispatch:
         if not flown_to_m and member.report is not None:
             flown_to_m = [member.place_m(self._live.frame)]
         if legs and not legs[0].homeward:
-            member.spared += len(legs)
-            member.committed_m = max(member.committed_m - way_m([*flown_to_m, *ends_m], self._live.spec), 0.0)
+            member.committed.spare(len(legs), way_m([*flown_to_m, *ends_m], self._live.spec))
         return ends_m
 
     def _note_given_up(self, member: Member, ends_m: list[FloatArray]) -> list[FloatArray]:

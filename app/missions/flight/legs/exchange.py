@@ -192,5 +192,5 @@ class LegExchange:
                     legs = new[member.name] if written else old[member.name]
                     member.ahead.extend(legs)
                     if written:
-                        member.committed_m += self._way_m(member, legs) - longer_m[member.name]
+                        member.committed.way_m += self._way_m(member, legs) - longer_m[member.name]
         live.changed.set()

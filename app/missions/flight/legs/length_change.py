@@ -56,7 +56,8 @@ class LengthChange:
         if allowed_m is None or not ahead or (begin_m is None and member.report is None):
             return len(ahead)
         begin_m = member.place_m(self._live.frame) if begin_m is None else begin_m
-        ends_m, over_m = [begin_m, *(leg.target_m for leg in ahead)], member.committed_m + member.late_m - allowed_m
+        ends_m = [begin_m, *(leg.target_m for leg in ahead)]
+        over_m = member.committed.way_m + member.committed.late_m - allowed_m
         keep = len(ahead)
         while keep and over_m > LEAST_WAY_M:
             last_m = way_m(ends_m[keep - 1 : keep + 1], spec)

@@ -78,9 +78,7 @@ class Engagement:
     async def _look(self) -> None:
         for member in self._live.team:
             info = self._hub.info(member.key)
-            member.link = info.state
-            if info.state in (LinkState.HEARD, LinkState.READY):
-                member.engaged = False
+            member.note_link(info.state)
             if member.withdrawal is None or not member.withdrawal.over:
                 await self._tell_of_loss(member, info)
             await self._advise(member, info)
@@ -153,9 +151,7 @@ class Engagement:
             return
         self._refused.pop(member.name, None)
         info = self._hub.info(member.key)
-        member.engaged = member.followed = True
-        member.refusal = ""
-        member.link = info.state
+        member.follow(info.state)
         member.report = near_report(live.frame, info.report) or member.report
         kinds = [AlarmKind.VEHICLE_REFUSES, AlarmKind.VEHICLE_RESTARTED]
         await live.journal.end(kinds, f"{member.name} follows", vehicle=member.name)

@@ -152,7 +152,7 @@ class FailsafeWatch:
             if withdrawn and member.withdrawal is not None:
                 member.withdrawal.below = strongest.failsafe is Failsafe.TRAFFIC
         elif held:
-            member.withdrawal = None
+            member.survey_again()
             self._live.changed.set()
 
     def _ships_of(self, member: Member) -> dict[Failsafe, str]:

@@ -290,9 +290,8 @@ class Withdrawals:
         """Stop a vehicle that is where it was to go."""
         self._ending.add(member.name)
         withdrawal.over = True
-        member.engaged = False
-        member.ahead.clear()
-        member.set_order(None)
+        member.disengage()
+        member.drop_legs()
         self._rising_since_s.pop(member.name, None)
         self._stranded.discard(member.name)
         member.flown.phase = phase_of(withdrawal)

@@ -65,7 +65,7 @@ async def test_legs_that_begin_where_the_last_ones_end_are_committed(assigned: A
 async def test_who_cannot_begin_its_leg_where_it_was_to_begin_gets_none(assigned: Assigned, why: str) -> None:
     numbers = {"a": 2, "b": 2}
     if why == "elsewhere":
-        assigned.b.set_order(assigned.b.order, np.array([44.0, 20.0]))
+        assigned.b.target_m = np.array([44.0, 20.0])
     elif why == "silent":
         assigned.b.engaged = False
     elif why == "gone":
@@ -75,7 +75,7 @@ async def test_who_cannot_begin_its_leg_where_it_was_to_begin_gets_none(assigned
     elif why == "not asked":
         del numbers["b"]
     else:
-        assigned.b.legs = 2
+        assigned.b.committed.legs = 2
     ends_m, not_assigned = await assigned.assign(**numbers)
     assert list(ends_m) == ["a"]
     if why == "barred":

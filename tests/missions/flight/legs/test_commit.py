@@ -139,10 +139,10 @@ async def test_what_a_vehicle_leaves_of_a_leg_when_it_arrives_is_not_counted_twi
     await commit(1, 2.0, 12.0)
     member.status = WaypointStatus.REACHED
     await commit(2, 9.5, 22.0)
-    assert member.committed_m == pytest.approx(20.0)
+    assert member.committed.way_m == pytest.approx(20.0)
     member.status = WaypointStatus.MISSED
     await commit(3, 15.0, 25.0)
-    assert member.committed_m == pytest.approx(30.0), "what was not reached is flown from where its vehicle is"
+    assert member.committed.way_m == pytest.approx(30.0), "what was not reached is flown from where its vehicle is"
 
 
 async def test_who_comes_up_at_home_stays_there(service: MissionService) -> None:

@@ -73,12 +73,12 @@ async def test_a_vehicle_that_is_sent_on_while_others_lateness_is_written_down_k
 async def test_a_way_home_that_is_given_up_gives_a_vehicle_no_more_to_fly(late: tuple[LiveMission, Dispatch]) -> None:
     live, dispatch = late
     member = live.team.members["a"]
-    member.committed_m = 500.0
+    member.committed.way_m = 500.0
     LegCommit(live, make_constraints(live.spec), leads=True).lead_home(
         member, [(np.array([50.0, 9.0]), 2.0), (np.array([90.0, 9.0]), 2.0), (np.array([90.0, 9.0]), 0.0)]
     )
     assert len(dispatch.give_up_legs(member, "b lies on its way home")) == 4
-    assert (member.committed_m, member.spared) == (500.0, 0)
+    assert (member.committed.way_m, member.committed.spared) == (500.0, 0)
 
 
 async def test_only_those_that_are_asked_about_are_judged(late: tuple[LiveMission, Dispatch]) -> None:

@@ -137,7 +137,7 @@ async def test_legs_that_come_out_the_same_stay(flight: Flight, database: Databa
 async def test_better_legs_replace_those_ahead_with_their_numbers(
     flight: Flight, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before, way_m = flight.ahead(), {m.name: m.committed_m for m in flight.live.team}
+    before, way_m = flight.ahead(), {m.name: m.committed.way_m for m in flight.live.team}
     finding(monkeypatch, aside)
     flight.sound(1)
     assert await flight.exchange.look()
@@ -154,7 +154,7 @@ async def test_better_legs_replace_those_ahead_with_their_numbers(
             assert member.target_m is not None
             ends = np.array([member.target_m, *(leg[1:] for leg in legs)])
             lengths_m.append(float(np.hypot(*np.diff(ends, axis=0).T).sum()))
-        assert member.committed_m - way_m[member.name] == pytest.approx(lengths_m[1] - lengths_m[0])
+        assert member.committed.way_m - way_m[member.name] == pytest.approx(lengths_m[1] - lengths_m[0])
 
 
 async def test_what_could_not_be_written_leaves_everything_as_it_was(

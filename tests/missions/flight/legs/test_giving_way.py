@@ -162,7 +162,7 @@ async def test_who_has_flown_its_last_leg_is_taken_to_fly_on_to_where_it_is_led(
     if lead_m is not None:
         lat, lon = LocalFrame(LAT, LON).to_geographic(*lead_m[:2])
         lead = Position(float(lat), float(lon), lead_m[2])
-    flown.set_order(replace(flown.order, lead=lead), flown.target_m)
+    flown.order = replace(flown.order, lead=lead)
     flown.status = WaypointStatus.REACHED
     scene.put("b", (48.0, 25.0, 3.0), (10.0, 25.0, 3.0))
     await scene.giving_way.look()

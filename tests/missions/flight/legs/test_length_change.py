@@ -27,4 +27,4 @@ async def test_legs_beyond_the_new_end_are_taken_back_once(service: MissionServi
     await change.fit()
     assert not change.is_due
     assert [leg.number for leg in member.ahead] == [2]
-    assert (member.committed_m, member.spared) == (20.0, 2)
+    assert (member.committed.way_m, member.committed.spared) == (20.0, 2)

@@ -126,7 +126,7 @@ async def test_vehicles_are_too_close_by_when_they_were_heard_whatever_their_clo
         watch.look()
 
     for member in live.team:
-        member.engaged, member.link, member.legs = True, LinkState.ENGAGED, 1
+        member.engaged, member.link, member.committed.legs = True, LinkState.ENGAGED, 1
     await beside(40.0)
     await beside(2.0)
     close = [m.name for m in live.team if any(one.failsafe is Failsafe.SEPARATION_LOST for one in m.failsafes)]

@@ -21,8 +21,8 @@ async def test_a_vehicle_that_has_flown_its_length_says_that_it_waits_for_the_ot
     placed = PlacedVehicles(live, service.hub, monkeypatch)
     for name in ("a", "b"):
         member = placed.put(name, (5.0, 5.0, 3.0), (50.0, 5.0, 3.0))
-        member.legs, member.flown.phase = 40, Phase.STOPPED
-    live.team.members["b"].legs = 39
+        member.committed.legs, member.flown.phase = 40, Phase.STOPPED
+    live.team.members["b"].committed.legs = 39
     reasons = {vehicle.name: vehicle.reason for vehicle in live.vehicles.all()}
     waits = "it has flown all of the length that it was given, and waits for the others"
     assert (reasons["a"], reasons["b"] == waits) == (waits, False)
