@@ -27,6 +27,7 @@ from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, show
 from tests.support.imc import log_writer
 from tests.support.mapping import line_files
+from tests.support.mapping.school import surveyed
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.ais import named, nmea, position
 from tests.support.missions.specs import lon_lat, rectangle
@@ -317,6 +318,30 @@ def space(guide: Guide, page: Page) -> None:
     page.mouse.up()
 
 
+def beams(guide: Guide, page: Page) -> None:
+    """Beams of a multibeam in space, a school of fish chosen with the lasso."""
+    mission = guide.service.create(
+        name="Fish",
+        vehicles=[{"name": "rover", "kind": "rest", "sensor": "multibeam"}],
+        area=rectangle(0, 0, 60, 60),
+        cell_m=2.0,
+    )
+    guide.service.post(f"/missions/{mission}/measurements", {"items": surveyed("rover", time.time() - 300.0)})
+    guide.service.get(f"/missions/{mission}/map")
+    show(page, mission)
+    by_id(page, "open-3d").click()
+    by_id(page, "toggle-points").click()
+    page.wait_for_timeout(SETTLE_MS)
+    box = by_id(page, "lasso").bounding_box()
+    assert box is not None
+    corners = [(0.28, 0.28), (0.48, 0.28), (0.48, 0.40), (0.28, 0.40), (0.28, 0.28)]
+    for number, (across, down) in enumerate(corners):
+        page.mouse.move(box["x"] + across * box["width"], box["y"] + down * box["height"])
+        if number == 0:
+            page.mouse.down()
+    page.mouse.up()
+
+
 def profile(guide: Guide, page: Page) -> None:
     """The bottom along a line."""
     show(page, guide.flown())
@@ -450,6 +475,7 @@ SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = 
     "imports": (imports, WIDE, "light"),
     "sites": (sites, WIDE, "light"),
     "space": (space, WIDE, "dark"),
+    "beams": (beams, WIDE, "light"),
     "profile": (profile, WIDE, "light"),
     "alarms": (alarms, WIDE, "light"),
     "tablet": (tablet, UPRIGHT, "dark"),
