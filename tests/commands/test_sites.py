@@ -64,7 +64,7 @@ def test_sites_are_listed_and_written_to_files(
     rows = (tmp_path / "c.csv").read_text().splitlines()
     assert len(rows) > 100
     assert all(row.endswith(",0") for row in rows[2:]), "the same soundings twice are no change"
-    assert run("export", site, "--format", "bag").exit_code == 2
+    assert run("export", site, "--format", "shp").exit_code == 2
     unknown = run("export", "nowhere")
     assert unknown.exit_code == 1
     assert "0 sites have ids that begin with 'nowhere'" in str(unknown.exception)

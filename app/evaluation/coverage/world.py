@@ -9,6 +9,7 @@ from app.arrays import BoolArray, FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.coverage import Coverage
 from app.exploration.motion.dubins import poses_along, shortest_way
+from app.exploration.motion.leg_rules import TURN_S
 from app.exploration.swath.raster import Flying
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.holidays import holidays, open_ground, side_of
@@ -19,7 +20,6 @@ from simulator.sonars.raycasting import depth_between, march
 FASTEST_MPS = 1.5
 CRUISE_M = 2.0
 MIN_ALTITUDE_M = 1.0
-TURN_S = 4.0
 ROLL_SD_RAD = float(np.radians(0.5))
 RANGE_NOISE = 0.002
 CELL_OF_DEPTH = 0.05

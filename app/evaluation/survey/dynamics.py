@@ -17,6 +17,7 @@ from app.estimation import SingleBeam
 from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, LEAST_SD_M
 from app.evaluation.survey.world import SPEED_MPS, Log, MapSoFar, SurveyScenario
 from app.exploration.core.problem import Belief, Planner, Situation
+from app.exploration.motion.leg_rules import AHEAD, HARDLY_BEGUN, TURN_S
 from app.exploration.motion.on_leg import Place, along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
@@ -28,17 +29,11 @@ from simulator.world import SimulatedVehicle
 TICK_S = 0.2
 DECISION_S = 0.5
 """What a decision takes."""
-AHEAD = 2
-"""Legs that a vehicle has after the one it flies."""
-HARDLY_BEGUN = 0.6
-"""Part of a leg that may be left when its vehicle gets a leg together with another that needs one."""
 LEAST_WAY_M = 1.0
 """Who has less way left gets no leg."""
 LEAD_M = 4.0
 """A vehicle keeps the leg after the one that it flies where it begins it within so many metres."""
 PASSED_WITHIN_M = 8.0
-TURN_S = 4.0
-"""Planners pay for turns in circles whose radius is flown in so many seconds."""
 FEWER_LINES = 0.97
 """Each try to find lines that can be finished plans with at most this share of the way of the one before."""
 TRIES = 15

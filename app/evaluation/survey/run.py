@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.arrays import FloatArray
-from app.evaluation.survey.dynamics import TURN_S, fly_pattern_at_sea, fly_planner_at_sea
+from app.evaluation.survey.dynamics import fly_pattern_at_sea, fly_planner_at_sea
 from app.evaluation.survey.oracle import oracle_soundings
 from app.evaluation.survey.world import (
     FAR_M,
@@ -25,6 +25,7 @@ from app.exploration.core.routes import Turns, Vehicles
 from app.exploration.lines.even_survey import Pattern, even_survey
 from app.exploration.lines.lattice import Sweep, longer_axis_rad
 from app.exploration.lines.lawnmower import lawnmower_routes
+from app.exploration.motion.leg_rules import TURN_S
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, there_and_back
 from app.exploration.survey.value import SurveyObjective, make_nodes

@@ -9,6 +9,9 @@ from app.arrays import FloatArray
 EARTH_M = 6_371_000.0
 """The Earth's mean radius."""
 
+METRES_PER_DEGREE = EARTH_M * math.pi / 180.0
+"""Of latitude; good to 0.6 %."""
+
 
 def horizontal_distance_m(a: tuple[float, float], b: tuple[float, float]) -> float:
     """Return how far two places (latitude, longitude, degrees) are from each other; good to 0.6 %, depth not counted.

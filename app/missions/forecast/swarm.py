@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
+from app.exploration.motion.leg_rules import HARDLY_BEGUN
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.flight.decisions.leg import Place
-from app.missions.flight.legs.demand import HARDLY_BEGUN
 from app.missions.flight.steering import steered
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray
-from app.mapping.coordinates.distances import leg_lengths_m
+from app.mapping.coordinates.distances import METRES_PER_DEGREE, leg_lengths_m
 from app.missions.flown import is_flown
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
@@ -18,7 +18,6 @@ from app.storage.queries import missions as mission_queries
 TOLERANCE_M = 0.2
 """What is left out lies so near to what is drawn; vehicles know where they are less well than that."""
 
-METRES_PER_DEGREE = 111_320.0
 FEWEST_TO_THIN = 3
 DIGITS = 7
 """Decimals of a degree: about a centimetre."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from shapely.affinity import scale
 from shapely.geometry import Polygon
 
+from app.mapping.coordinates.distances import METRES_PER_DEGREE
 from app.missions.fleet.hub import called
 from app.missions.live.mission import LiveMission
 from app.missions.views.mission import CheckStatus, CheckView
@@ -13,8 +14,6 @@ from app.storage.models import MissionRow
 
 BESIDE_M = 30.0
 """Vehicles turn, wait and drift so far beside their areas."""
-METRES_PER_DEGREE = 111_000.0
-
 Ring = Sequence[tuple[float, float]]
 
 

@@ -2,14 +2,12 @@
 
 from app.estimation import Sensor, SingleBeam
 from app.exploration.lines.lawnmower import LawnmowerPlanner
+from app.exploration.motion.leg_rules import TURN_S
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.task.survey_lines import given_lines
-
-TURN_S = 4.0
-"""A vehicle whose turning circle nobody knows turns in one whose radius it flies in so many seconds."""
 
 
 def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase:

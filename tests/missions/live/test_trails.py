@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from app.missions.live.trails import METRES_PER_DEGREE, TOLERANCE_M, in_order, worth_drawing
+from app.mapping.coordinates.distances import METRES_PER_DEGREE
+from app.missions.live.trails import TOLERANCE_M, in_order, worth_drawing
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec
 from tests.support.missions.specs import lon_lat
 

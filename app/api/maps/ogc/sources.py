@@ -16,6 +16,7 @@ from app.api.accounts.processes import comes_from_peer
 from app.api.maps.ogc.crs import Box
 from app.api.maps.ogc.parameters import MOST_LIMIT, ItemsQuery
 from app.api.state import EdgeState
+from app.mapping.coordinates.distances import METRES_PER_DEGREE
 from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.operations.maps.features import (
     Feature,
@@ -37,8 +38,6 @@ BESIDE_M = 60_000.0
 """Farther from the area nothing of a mission is looked for."""
 NEAR_M = 500.0
 """Vehicles turn and drift so far beside their ways."""
-METRES_PER_DEGREE = 111_000.0
-
 FEW = 4
 """All features are counted of at most so many missions."""
 

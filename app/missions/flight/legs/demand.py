@@ -6,15 +6,13 @@ from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
+from app.exploration.motion.leg_rules import AHEAD, HARDLY_BEGUN
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.way import least_way_m
 from app.missions.team import Member
-
-AHEAD = 2
-"""Legs that a vehicle has after the one it flies."""
 
 AHEAD_WHEN_WATCHED = 1
 """The same where targets move, or vehicles come up by what they say of their position: decisions follow closer."""
@@ -29,9 +27,6 @@ MOST_AHEAD = 20
 
 SOON = 1.3
 """A vehicle whose legs end within this many times the usual lead is decided for together with one that needs a leg."""
-
-HARDLY_BEGUN = 0.6
-"""A leg is decided together with those of others where no more than this part of a longest leg is left before it."""
 
 
 class LegDemand:

@@ -15,6 +15,7 @@ from sqlalchemy import select
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import defer
 
+from app.mapping.coordinates.distances import METRES_PER_DEGREE
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.kriging.supersoundings import merge_soundings
 from app.mapping.quality.depth_offset import offset_between
@@ -48,7 +49,6 @@ from app.storage.models import ImportRow, ReferenceRow
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import stored_maps
 
-METRES_PER_DEGREE = 111_200.0
 MAX_SIDE_M = 50_000.0
 """Of an area that a chart is asked for."""
 

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from app.missions.flight.legs.demand import AHEAD, MOST_AHEAD, LegDemand
+from app.exploration.motion.leg_rules import AHEAD
+from app.missions.flight.legs.demand import MOST_AHEAD, LegDemand
 from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec

@@ -29,7 +29,7 @@ import {
 } from "../../state/analysis/cloud";
 import { count } from "../../state/format";
 import { said } from "../../state/session";
-import { depthPalette, mission, rangeOf, selectedId } from "../../state/store";
+import { depthPalette, isDark, mission, rangeOf, selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, flips, Typed } from "../parts/Controls";
 import { Lasso } from "./Lasso";
@@ -44,10 +44,20 @@ const COLOURS: Partial<Record<SoundingState, Colour>> = {
   restored: [0.3, 0.85, 0.35],
 };
 
-/** Colours in space are mixed as light is. */
-const linear = (part: number) => (part / 255) ** 2.2;
+/** So much light has at least what has the colour of its depth before a dark ground: deep water is nearly black. */
+const LEAST_LIGHT = 0.12;
 
-function coloursOf(points: Cloud, chosen: readonly number[], palette: Palette, low: number, high: number) {
+/** Colours in space are mixed as light is. */
+const linear = (part: number, least: number) => least + (1 - least) * (part / 255) ** 2.2;
+
+interface DepthColours {
+  palette: Palette;
+  low: number;
+  high: number;
+  leastLight: number;
+}
+
+function coloursOf(points: Cloud, chosen: readonly number[], by: DepthColours) {
   const colours = new Float32Array(3 * points.id.length);
   points.state.forEach((state, i) => {
     const own = COLOURS[state];
@@ -57,8 +67,11 @@ function coloursOf(points: Cloud, chosen: readonly number[], palette: Palette, l
         3 * i,
       );
     else {
-      const [r, g, b] = colourAt(palette, points.depth_m[i] as number, low, high);
-      colours.set([linear(r), linear(g), linear(b)], 3 * i);
+      const colour = colourAt(by.palette, points.depth_m[i] as number, by.low, by.high);
+      colours.set(
+        colour.map((part) => linear(part, by.leastLight)),
+        3 * i,
+      );
     }
   });
   for (const i of chosen)
@@ -110,7 +123,8 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
         const range = rangeOf("depth");
         if (!points || !range) return;
         const { palette } = DEPTH_PALETTES[depthPalette.value];
-        scene.colourSoundings(coloursOf(points, chosenPoints.value, palette, range.low, range.high));
+        const leastLight = isDark.value ? LEAST_LIGHT : 0;
+        scene.colourSoundings(coloursOf(points, chosenPoints.value, { palette, ...range, leastLight }));
       }),
       effect(() => scene.setFloorShown(floor.value)),
     ];
