@@ -37,7 +37,7 @@ from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
 from app.missions.flight.observation.vehicle_clocks import VehicleClocks
 from app.missions.flight.observation.waiting import Waiting
-from app.missions.flight.orders import OrderBook, OrderedFlight
+from app.missions.flight.orders import OrderBook, OrderContext
 from app.missions.flight.own_legs import OwnLegs
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.flight.team_steps import TeamSteps
@@ -105,7 +105,7 @@ class Runner:
         self._giving_way = GivingWay(live, moment, room, asides, others, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
-        self._ordered = OrderedFlight(planner, constraints, self._range, self._dispatch, self._apart)
+        self._order_context = OrderContext(planner, constraints, self._range, self._dispatch, self._apart)
         self._withdrawals = Withdrawals(live, hub, self._leg_commit, self._dispatch, self._range, time_scale)
 
     async def run(self) -> str:
@@ -130,7 +130,7 @@ class Runner:
         ]
         try:
             resumed = await self._recover()
-            await self._orders.begin(self._ordered)
+            await self._orders.begin(self._order_context)
             reason = await self._fly_home(resumed)
             live.flown_out = True
             await self._onboard.drop()

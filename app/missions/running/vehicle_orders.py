@@ -7,7 +7,7 @@ from app.arrays import FloatArray
 from app.exploration.lines.dense_lines import dense_lines
 from app.exploration.lines.flown_lines import line_near, line_now
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.flight.orders import OrderBook, OrderedFlight, free_region, is_free
+from app.missions.flight.orders import OrderBook, OrderContext, free_region, is_free, lines_of, start_m
 from app.missions.live.mission import LiveMission
 from app.missions.spec.orders import DenserOrder, GoOrder, OrderKind, RepeatOrder
 from app.missions.spec.swath import SwathSonarSpec
@@ -26,11 +26,11 @@ async def go(live: LiveMission, name: str, order: GoOrder, actor: str) -> OrderV
     book = live.part(OrderBook)
     lon, lat = order.position
 
-    async def find(_member: Member, flight: OrderedFlight) -> FloatArray:
+    async def find(_member: Member, context: OrderContext) -> FloatArray:
         place_m = _place_m(book, "position", lon, lat)
-        region = await live.in_thread(free_region, flight.constraints)
+        region = await live.in_thread(free_region, context.constraints)
         if not is_free(region, place_m):
-            inside = is_free(Polygon(flight.constraints.area), place_m)
+            inside = is_free(Polygon(context.constraints.area), place_m)
             what = "lies in a keep-out zone or its margin" if inside else "lies outside the area"
             raise InvalidRequestError("position", f"{lat:.6f}, {lon:.6f} {what}", "a place inside, clear of the zones")
         return place_m[None]
@@ -41,8 +41,8 @@ async def go(live: LiveMission, name: str, order: GoOrder, actor: str) -> OrderV
 async def skip_line(live: LiveMission, name: str, actor: str) -> OrderView:
     """Let a vehicle leave out the rest of its line. Raises VehicleNotFoundError, ConflictError."""
 
-    async def find(member: Member, flight: OrderedFlight) -> FloatArray:
-        if not flight.planner.planner.flies_lines:
+    async def find(member: Member, context: OrderContext) -> FloatArray:
+        if not context.planner.planner.flies_lines:
             raise ConflictError(f"planner {live.spec.planner.name!r} flies no lines", "send the vehicle elsewhere: go")
         if member.asked is not None:
             raise ConflictError(
@@ -61,8 +61,8 @@ async def repeat_line(live: LiveMission, name: str, order: RepeatOrder, actor: s
     """Let a vehicle fly a line again. Raises VehicleNotFoundError, ConflictError, InvalidRequestError."""
     book = live.part(OrderBook)
 
-    async def find(member: Member, _flight: OrderedFlight) -> FloatArray:
-        lines = await book.lines(member)
+    async def find(member: Member, context: OrderContext) -> FloatArray:
+        lines = await lines_of(live, member, context.constraints)
         line = line_now(lines) if order.near is None else line_near(lines, _place_m(book, "near", *order.near))
         if line is None:
             raise ConflictError(f"vehicle {name!r} has not flown a line yet", "wait until it has")
@@ -81,12 +81,12 @@ async def survey_denser(live: LiveMission, order: DenserOrder, actor: str) -> Or
     part = Polygon(np.array([_place_m(book, "area", lon, lat) for lon, lat in ring]))
     names = [order.vehicle] if order.vehicle is not None else _nearest_first(live, part)
 
-    async def find(member: Member, flight: OrderedFlight) -> FloatArray:
+    async def find(member: Member, context: OrderContext) -> FloatArray:
         spacing_m = order.line_spacing_m or CLOSER * spacing_of(live, member)
-        start_m = book.start_m(member, OrderKind.DENSER)
+        begin_m = start_m(live, member, OrderKind.DENSER)
 
         def lines() -> FloatArray:
-            return dense_lines(part, free_region(flight.constraints), spacing_m, start_m)
+            return dense_lines(part, free_region(context.constraints), spacing_m, begin_m)
 
         try:
             return await live.in_thread(lines)
