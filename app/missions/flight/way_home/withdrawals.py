@@ -267,7 +267,7 @@ class Withdrawals:
             off = "zones" if self._live.search is None else "what stands there, or nobody has looked at"
             words = f"no way leads home that keeps clear of {off}: it comes up where it is"
             await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
-            member.withdrawal = Withdrawal(Response.SURFACE, words)
+            self._live.withdraw(member, Response.SURFACE, words)  # it may have been stopped meanwhile
             return
         self._lay[member.name] = frozenset(other.name for other in self._live.team.at_rest)
         # In a search it ends where it leads, which may be beside that place.
