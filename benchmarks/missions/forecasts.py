@@ -181,7 +181,7 @@ async def forecast_and_flown(
     took_s = seconds_of(live)
     flown_m = {member.name: member.flown.flown_m for member in live.team}
     await asyncio.sleep(1.0)
-    await live.build_map()
+    await live.map.build()
     came = live.progress()
     ends = {"coverage": came.coverage_pct, "deviation": came.mean_sd_m or 0.0}
     figures = compared("before", before, took_s, flown_m, ends)

@@ -130,7 +130,7 @@ async def flown(service: MissionService, options: argparse.Namespace, watch: Sto
             handles.append(process.num_fds())
             told = {"hour": len(memory_mb) - 1, "memory_mb": memory_mb[-1], "wall_s": wall_s(begun)}
             print(json.dumps(told), flush=True)
-    await live.build_map()
+    await live.map.build()
     came, half = live.progress(), memory_mb[len(memory_mb) // 2 :]
     growth = float(np.polyfit(np.arange(len(half)), half, 1)[0]) if len(half) > 1 else math.nan
     first = watch.first_leg or (math.nan, math.nan)

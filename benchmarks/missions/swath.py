@@ -79,7 +79,7 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         while (view := mission_view(live)).state not in ENDED:  # noqa: ASYNC110
             await asyncio.sleep(0.5)
         await asyncio.sleep(1.0)
-        await live.build_map()
+        await live.map.build()
         progress = live.progress()
         async with database.reading() as session:
             tracks = await track_points(session, identity)

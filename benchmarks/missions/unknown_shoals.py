@@ -151,7 +151,7 @@ async def _flown(spec: MissionSpec, floor: Floor, service: MissionService) -> tu
                 east_m, north_m = member.place_m(live.frame)
                 ways[member.name].append((float(east_m), float(north_m)))
         await asyncio.sleep(LOOK_S / TIME_SCALE)
-    await live.build_map()
+    await live.map.build()
     built = live.builder.newest
     error_m = math.nan if built is None else floor.error_m(built.map)
     return live.progress().coverage_pct or 0.0, error_m, list(ways.values()), view.state != "finished"

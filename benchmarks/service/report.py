@@ -99,7 +99,7 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
             if number % 50 == 49:
                 await live.journal.flush()
         await live.journal.flush()
-        await live.build_map()
+        await live.map.build()
         progress = live.progress()
         used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
         processor_s = sum(one.ru_utime + one.ru_stime for one in used)

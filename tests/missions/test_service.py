@@ -269,7 +269,7 @@ async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service:
     await rover.post()
     await act(service, mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")  # and arrived: the loop ends, the stop waits for a poll
-    await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
+    await until(lambda: service._registry._live[mission.id].flight.halted, "its stop is on the way")
     try:
         await act(service, mission.id, "abort", actor="Ana")
     except MoveRefusedError:
@@ -292,7 +292,7 @@ async def test_a_service_that_is_shut_down_while_a_mission_ends_writes_the_end_f
     await rover.post()
     await act(service, mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
-    await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
+    await until(lambda: service._registry._live[mission.id].flight.halted, "its stop is on the way")
     await harbour.close()
     async with database.reading() as session:
         row = await session.get(MissionRow, mission.id)

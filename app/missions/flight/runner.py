@@ -132,7 +132,7 @@ class Runner:
             resumed = await self._recover()
             await self._orders.begin(self._order_context)
             reason = await self._fly_home(resumed)
-            live.flown_out = True
+            live.flight.come_to_end()
             await self._onboard.drop()
             return reason
         finally:
@@ -142,7 +142,7 @@ class Runner:
                 keeper.cancel()
             await asyncio.gather(*keepers, return_exceptions=True)
             await self._maps.end()
-            live.stop_counting()
+            live.flight.stop_counting()
             await to_the_end(save_elapsed(live))
             live.flight_ends()
 

@@ -174,7 +174,7 @@ class TeamSteps:
     async def _send_until_flown(self) -> None:
         """Send the step again for as long as every vehicle refused it: what nobody took on is not over."""
         live = self._live
-        while not live.halted:
+        while not live.flight.halted:
             ordered = [member for member in live.team if member.order is not None]
             if not ordered or not all(map(self._dispatch.has_refused, ordered)):
                 return

@@ -92,7 +92,7 @@ async def take_up(
     await live.stored_soundings.show(stored, imported, imported=prior, ended=live.header.state in ENDED)
     if search is not None:
         await _take_up_search(live, search)
-    live.show_reference(reference)
+    live.map.show_reference(reference)
     await live.trails.newest()
     live.journal.travelled_m = live.trails.length_m
     if step is not None:

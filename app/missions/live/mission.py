@@ -1,15 +1,13 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
-from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.compute.compute import Compute
@@ -20,12 +18,16 @@ from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetEvent, VehicleReport
 from app.missions.live.boundaries import Boundaries
+from app.missions.live.flight_status import FlightStatus
 from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
 from app.missions.live.journals.range_journal import RangeJournal
 from app.missions.live.journals.swath_intake import SwathIntake
+from app.missions.live.mission_map import MissionMap
+from app.missions.live.placed_files import PlacedFiles
 from app.missions.live.progress import figures, progress, search_progress, summary
 from app.missions.live.ships import ShipsAbout
+from app.missions.live.sounding_corrections import SoundingCorrections
 from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.threads import Threads
 from app.missions.live.trails import Trails
@@ -34,19 +36,16 @@ from app.missions.live.watchers.broadcast import Broadcaster
 from app.missions.live.watchers.feed import LiveFeed
 from app.missions.live.watchers.vehicles import VehicleViews
 from app.missions.live.watchers.waypoints import WaypointViews
-from app.missions.maps.builder import HEAVY, BuiltMap, MapBuilder
-from app.missions.maps.live_grid import map_of
-from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
-from app.missions.maps.tiles import TileCache
+from app.missions.maps.builder import HEAVY, MapBuilder
+from app.missions.maps.snapshot import MissionFacts
 from app.missions.pings.gate import PingGate
 from app.missions.pings.store import PingStore
 from app.missions.recovery.energy import Energy
 from app.missions.search.mates import Mates
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
-from app.missions.soundings.beam_edits import BeamEdit, rulings_of
+from app.missions.soundings.beam_edits import BeamEdit
 from app.missions.soundings.corrections import Corrections
-from app.missions.soundings.gate import Gate
 from app.missions.spec.budget import Budget
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
@@ -100,19 +99,10 @@ class LiveMission:
         """Who does heavy work; None: this process alone."""
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
-        corrections = Corrections.of(
-            spec, self.frame, stored.tide_table, stored.adjustment, stored.mountings, rulings_of(stored.beam_edits)
-        )
-        self.beam_edits = dict(stored.beam_edits)
-        """What operators said of beams, by number, in the order in which they said it."""
-        self.stated_mountings = dict(stored.mountings)
-        """How its vehicles, also those that left, say that their sonars are mounted."""
-        self.gate = self._gate_with(corrections)
-        self.reference_m: FloatArray | None = None
-        """Depths of the grid that the map is compared with, at the map's cells."""
-        self.revision = 0
-        """Counts changes of what the map is shown with."""
-        self.tiles = TileCache()
+        self.corrections = SoundingCorrections(stored, self.frame, self.area, self.margin_m)
+        """What its soundings are corrected by."""
+        self.gate = self.corrections.gate
+        """Judges and corrects what is measured."""
         self.trails = Trails(database, row.id)
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the flight may be waiting for."""
@@ -120,7 +110,7 @@ class LiveMission:
         """What a mission of kind search knows of its site."""
         self.pings = PingStore(database, row.id, PingGate(self.frame, self.gate.outside), ping_files)
         """All its pings."""
-        self.builder.swath.place = corrections.placing()
+        self.builder.swath.place = self.corrections.now.placing()
         self._mates = None if search is None else Mates(self.team, lambda m: hub.info(m.key).report, spec, self.frame)
         take_scans = (
             None
@@ -147,21 +137,12 @@ class LiveMission:
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
-        self._placed_files: list[tuple[str, str]] = []
-        """Vehicles, and multibeams' own files of them that are being read."""
-        self.fitted_budget = spec.budget
+        self._fitted_budget = spec.budget
         """The length that the legs which vehicles have ahead fit into."""
-        self.flown_out = False
-        """Whether its flight came to its end: nothing changes any more how long it is."""
+        self.flight = FlightStatus()
+        """How its flight stands in this process."""
         self.ending = Ending.recall(row.ending)
         """What it becomes once all vehicles are home; None while it goes on."""
-        self.halted = False
-        """Set while vehicles are being stopped: the flight must not send them off again as it ends."""
-        self.standstill = ""
-        """Why no vehicle may be sent anywhere now; empty while at least one may."""
-        self.running_since_s: float | None = None
-        self._counting = False
-        """Whether what vehicles fly is counted: while the flight goes on, until that is stored at its end."""
         self.database = database
         """What is written through it is refused once another process has the mission."""
         self.waypoints = WaypointViews(lambda: self.spec, self.team, self.broadcaster)
@@ -188,24 +169,25 @@ class LiveMission:
         self.feed = LiveFeed(
             self.broadcaster, self.vehicles.message, targets, partial(search_progress, self), self.ships.message
         )
+        self.map = MissionMap(
+            builder,
+            self.swath,
+            self.stored_soundings,
+            self.journal,
+            self.header,
+            self.feed,
+            lambda: self.facts,
+            self._map_executor,
+            self.publish_summary,
+        )
+        """Its map, as it is made and shown."""
+        self.placed_files = PlacedFiles()
+        """Multibeams' own files that are being read."""
         self.time_scale = time_scale
         self._threads = threads
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
         self.notice_imports = Shared(self._notice_imports)
         """Count anew where logs were taken in, by the command line as well, or taken back since that was last done."""
-
-    @contextmanager
-    def reading_placed(self, file: str, vehicle: str) -> Iterator[None]:
-        """Note that a multibeam's own file is being read, whose beams come placed."""
-        self._placed_files.append((vehicle, file))
-        try:
-            yield
-        finally:
-            self._placed_files.remove((vehicle, file))
-
-    def placed_files_being_read(self, vehicle: str) -> set[str]:
-        """Return the multibeam's own files of a vehicle that are being read."""
-        return {file for own, file in self._placed_files if own == vehicle}
 
     def part(self, kind: Callable[["LiveMission"], Part]) -> Part:
         """Return the mission's own object of a class, made of the mission when it is first asked for."""
@@ -213,13 +195,6 @@ class LiveMission:
             self._parts[kind] = kind(self)
         found: Part = self._parts[kind]
         return found
-
-    def make_gate(self) -> Gate:
-        """Return a gate with the mission's corrections, which has seen no sounding yet."""
-        return self._gate_with(self.gate.corrections)
-
-    def _gate_with(self, corrections: Corrections) -> Gate:
-        return Gate(corrections, Polygon(self.area), margin_m=self.margin_m, noise=self.spec.sounding_noise)
 
     async def _notice_imports(self) -> None:
         async with self.database.reading() as session:
@@ -235,7 +210,7 @@ class LiveMission:
             if self.pings.taken_back != before:
                 await self.trails.read_again()
             self.stored_soundings.changed(newest_import=newest)
-            self.swath.correct(self.gate.corrections)
+            self.swath.correct(self.corrections.now)
             return Counts(
                 counted.get("accepted", 0), counted.get("rejected", 0), pinged.pings, pinged.beams, pinged.rejected
             )
@@ -257,35 +232,41 @@ class LiveMission:
     @property
     def running(self) -> bool:
         """Whether its flight goes on in this process."""
-        return self.running_since_s is not None
+        return self.flight.goes_on
+
+    @property
+    def counts(self) -> Counts:
+        """How much was measured in it, and is stored."""
+        return self.journal.counts
 
     def flight_begins(self) -> None:
         """Note that its flight goes on in this process from now on."""
-        self.running_since_s = asyncio.get_running_loop().time()
-        self._counting = True
-        self.flown_out = False
+        self.flight.begin()
         self.call_everybody_home()
+
+    @property
+    def legs_fit_length(self) -> bool:
+        """Whether the legs that vehicles have ahead fit into its length, which may have changed since they got them."""
+        return self._fitted_budget == self.spec.budget
+
+    def note_legs_fitted(self) -> None:
+        """Note that legs beyond the end that it has now are being taken back."""
+        self._fitted_budget = self.spec.budget
 
     def count_elapsed(self, seconds: float) -> None:
         """Count seconds of its flight that are stored now."""
-        if self.running_since_s is not None:
-            self.running_since_s += seconds
+        self.flight.store(seconds)
         self.header.elapsed_s += seconds
-
-    def stop_counting(self) -> None:
-        """Count nothing any more of what vehicles fly: what is stored now is what was flown."""
-        self._counting = False
 
     def flight_ends(self) -> None:
         """Note that nobody flies it here any more."""
-        self.running_since_s = None
-        self.standstill = ""
+        self.flight.end()
         for member in self.team:
             member.come_to_rest()
 
     def stand_still(self, why: str) -> None:
         """Note why no vehicle may be sent anywhere; empty: at least one may again."""
-        self.standstill = why
+        self.flight.stand_still(why)
         if why:
             self.publish_summary()
 
@@ -301,7 +282,7 @@ class LiveMission:
     def set_off(self) -> None:
         """Let the flight begin: it engages every vehicle anew."""
         self.header.state = MissionState.RUNNING
-        self.halted = False
+        self.flight.set_off()
         for member in self.team:
             member.disengage()
             member.refusal = ""
@@ -318,30 +299,23 @@ class LiveMission:
         """Correct soundings anew, as the database has them now; the caller holds the journal's ``writing``."""
         # How long it is may have changed meanwhile.
         self.spec = spec.with_budget(self.spec.budget)
-        self.gate.corrections = corrections
+        self.corrections.apply(corrections)
         self.swath.correct(corrections)
         self.recount(counts)
         self.journal.tell_of_missing_level()
-        self.revision += 1
+        self.map.shown_otherwise()
 
     def edit_beams(self, edits: Mapping[int, BeamEdit]) -> None:
         """Let operators have said this of beams, as the database has it; the caller holds the journal's ``writing``."""
-        self.beam_edits = dict(edits)
-        self.gate.corrections = self.gate.corrections.ruled(rulings_of(edits))
-        self.swath.correct(self.gate.corrections)
+        self.corrections.edit_beams(edits)
+        self.swath.correct(self.corrections.now)
         self.recount(self.journal.counts)
-        self.revision += 1
+        self.map.shown_otherwise()
 
     def state_mounting(self, vehicle: str, mounting: MountingSpec) -> None:
         """Note how the sonar of a vehicle that joins is mounted; nothing was sounded by it under another mounting."""
-        if mounting == self.stated_mountings.get(vehicle, MountingSpec()):
-            return
-        self.stated_mountings[vehicle] = mounting
-        before = self.gate.corrections
-        self.gate.corrections = Corrections.of(
-            self.spec, self.frame, before.table, before.adjustment, self.stated_mountings, before.rulings
-        )
-        self.swath.correct(self.gate.corrections)
+        if self.corrections.state_mounting(self.spec, vehicle, mounting):
+            self.swath.correct(self.corrections.now)
 
     def relength(self, budget: Budget, left_m: Mapping[str, float]) -> None:
         """Be of another length from now on; ``left_m``: by vehicle what it may fly yet, metres, as it is stored."""
@@ -365,7 +339,7 @@ class LiveMission:
 
     def halt(self) -> None:
         """Keep the flight from sending anything more, and wake everyone who waits for a waypoint."""
-        self.halted = True
+        self.flight.halt()
         for member in self.team:
             member.pursuing = None
         self.changed.set()
@@ -384,7 +358,7 @@ class LiveMission:
 
     def receive(self, event: FleetEvent) -> None:
         """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
-        self.reports.take(event, self.spec, running=self._counting, standing=bool(self.standstill))
+        self.reports.take(event, self.spec, running=self.flight.counting, standing=bool(self.flight.standstill))
         if self._mates is not None and isinstance(event, VehicleReport):
             self._mates.note(event.vehicle)
 
@@ -425,39 +399,16 @@ class LiveMission:
             home = self.spec.recovery_of(member.spec)
             self.withdraw(member, Response.STOP if home is None else Response.RETURN, why)
 
-    async def build_map(self) -> BuiltMap | None:
-        """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
-        await self.stored_soundings.complete()
-        await self.swath.complete()
-        before = self.builder.newest
-        built = await self.mapped(partial(self.builder.build, thorough=True))
-        if built is not None and built is not before:
-            self.publish_map(built)
-            self.publish_summary()
-        return built
-
-    @property
-    def map_is_missing(self) -> bool:
-        """Whether something was measured that is in no map yet."""
-        unmapped = self.builder.newest is None and self.journal.counts.pings > 0
-        return self.builder.stale or self.swath.behind or (unmapped and self.swath.unread)
-
-    async def map_what_is_stored(self) -> None:
-        """Make the map of a mission that was just taken up, and tell everyone who watches how far it has come."""
-        if self.map_is_missing:
-            await self.build_map()
-            await self.stored_soundings.keep(self.header.step, ended=self.header.state in ENDED)
-
     def compute_by(self, compute: Compute) -> None:
         """Have heavy work done by a cluster, where there is one."""
         self.compute = compute
         self.builder.elsewhere = compute.in_thread
 
-    async def mapped(self, work: Callable[..., Made], *arguments: Any) -> Made:
-        """Have the builder make a map in a worker thread that no vehicle waits for."""
+    def _map_executor(self) -> Executor:
+        """Return whose threads maps are made in that no vehicle waits for: large ones wait for the cluster's turn."""
         many = self.compute is not None and self.journal.counts.accepted >= HEAVY
         waiting = self.compute.waiting if self.compute is not None and many else None
-        return await asyncio.get_running_loop().run_in_executor(waiting or self._threads.making, work, *arguments)
+        return waiting or self._threads.making
 
     async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
         """Compute something that a vehicle may wait for, or that takes a moment, in a worker thread."""
@@ -476,28 +427,6 @@ class LiveMission:
     def planning_sensor(self) -> Sensor:
         """What the mission's planner takes its vehicles to measure with."""
         return SingleBeam() if self.search is None else self.search.site.scanner
-
-    def show_reference(self, depths_m: FloatArray | None) -> None:
-        """Compare the map with these depths at its cells, or with nothing."""
-        self.reference_m = depths_m
-        self.revision += 1
-
-    def snapshot(self, built: BuiltMap) -> MapSnapshot:
-        """Return a map with what is needed to understand it."""
-        step = self.stored_soundings.step_of(built, self.header.step)
-        return MapSnapshot(self.facts, built, step, self.reference_m, self.revision, interpolation=self.builder.live)
-
-    def live_snapshot(self) -> MapSnapshot | None:
-        """Return the newest map with what was sounded since; None before the first sounding. For a worker thread."""
-        live = None if self.builder.live is None else self.builder.live.fresh()
-        built = self.builder.newest
-        if built is not None:
-            return replace(self.snapshot(built), live=live)
-        if live is None:
-            return None
-        # No map was made yet: there is nothing but what was just sounded.
-        first = BuiltMap(NOT_MADE, int(live.count.sum()), map_of(self.builder.grid, live), "")
-        return MapSnapshot(self.facts, first, self.header.step, self.reference_m, self.revision, live)
 
     def _take_soundings(self, soundings: FloatArray) -> None:
         """Take in committed soundings, shape (n, 4): east, north, depth, standard deviation."""
@@ -520,10 +449,6 @@ class LiveMission:
                 continue  # it is nowhere near
             if member is not None and np.isfinite(reached).all():
                 member.swath = Swath(float(last.time_s[0]), *reached[0].tolist())
-
-    def publish_map(self, built: BuiltMap) -> None:
-        """Tell everyone who watches that there is a new map."""
-        self.feed.of_map(built, self.header.step)
 
     def figures(self) -> dict[str, float]:
         """Return how far the mission has come, as each step keeps it."""

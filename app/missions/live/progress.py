@@ -1,6 +1,5 @@
 """How far a mission has come, how long it still takes, and how it stands in a list."""
 
-import asyncio
 import math
 from typing import TYPE_CHECKING
 
@@ -30,9 +29,7 @@ def figures(live: "LiveMission") -> dict[str, float]:
 def progress(live: "LiveMission") -> Progress:
     """Return how far the mission has come."""
     built = live.builder.newest
-    header, counts = live.header, live.journal.counts
-    loop_time = asyncio.get_running_loop().time()
-    running_s = loop_time - live.running_since_s if live.running_since_s is not None else 0.0
+    header, counts = live.header, live.counts
     search = search_progress(live)
     left = remaining(live.spec, live.team) if search is None else within_window(search)
     swept = live.builder.ensonified()
@@ -55,7 +52,7 @@ def progress(live: "LiveMission") -> Progress:
         mean_sd_m=built.mean_sd_m if built is not None else None,
         objective=header.objective,
         terms=header.terms or {},
-        elapsed_s=header.elapsed_s + running_s,
+        elapsed_s=header.elapsed_s + live.flight.unstored_s,
         eta_s=_eta_s(live),
         search=search,
     )
@@ -116,8 +113,8 @@ def summary(live: "LiveMission") -> MissionSummary:
 def _why_it_waits(live: "LiveMission") -> str:
     trouble = live.journal.storage.trouble
     if not trouble:
-        stands = live.standstill and live.header.state is MissionState.RUNNING
-        return f"no vehicle can be sent anywhere: {live.standstill}" if stands else ""
+        stands = live.flight.standstill and live.header.state is MissionState.RUNNING
+        return f"no vehicle can be sent anywhere: {live.flight.standstill}" if stands else ""
     waits = "; the vehicles wait at their waypoints" if live.header.state is MissionState.RUNNING else ""
     return f"nothing can be written down: {trouble}{waits}"
 

@@ -37,7 +37,7 @@ async def waypoint(
 
     def must_stop() -> bool:
         waits = live.header.state is MissionState.READY or (
-            live.header.state is MissionState.RUNNING and not live.halted
+            live.header.state is MissionState.RUNNING and not live.flight.halted
         )
         return not waits or live.team.get(vehicle) is None
 

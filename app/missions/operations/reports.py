@@ -139,7 +139,7 @@ class Reports:
         async with live.database.reading() as session:
             reasons = await sounding_queries.refusals(session, live.id)
             events = await event_queries.events_of_levels(session, live.id, (Level.WARNING, Level.ALARM))
-        many = live.journal.counts.accepted + live.journal.counts.rejected > MOST_SOUNDINGS
+        many = live.counts.accepted + live.counts.rejected > MOST_SOUNDINGS
         material = Material(
             facts=live.facts,
             created=now(),
@@ -155,7 +155,7 @@ class Reports:
             "adjustment": adjustment_view(live),
             "pings": pings,
             "imports": await imports_of(live),
-            "reference": None if live.reference_m is None else await reference_of(live),
+            "reference": None if live.map.reference_m is None else await reference_of(live),
         }
         refusals = Counter(_alike(reason) for _, reason in live.builder.doubted())
         for reason, count in reasons.items():

@@ -26,7 +26,7 @@ async def describe_anew(live: LiveMission, spec: MissionSpec, actor: str) -> Non
             f"the mission is {live.header.state}: what it is to do stays as it is",
             "copy it: create a new mission with the changed description",
         )
-    counts = live.journal.counts
+    counts = live.counts
     if counts.accepted + counts.rejected + counts.pings + counts.rejected_pings:
         raise ConflictError("soundings were taken in the mission", "copy it: create a new mission")
     state = MissionState.READY if spec.vehicles else MissionState.DRAFT

@@ -51,7 +51,7 @@ class FinalMaps:
 
     def take_up(self, live: LiveMission) -> None:
         """Make the map of what was stored."""
-        if live.map_is_missing:
+        if live.map.is_missing:
             self._begin(self._taken_up, live, self._map_stored(live))
 
     def map_last(self, live: LiveMission) -> None:
@@ -79,7 +79,7 @@ class FinalMaps:
 
     async def _map_stored(self, live: LiveMission) -> None:
         async with self._one_at_a_time:
-            await live.map_what_is_stored()
+            await live.map.build_stored()
 
     async def _survey(self, live: LiveMission) -> None:
         while live.id in self._wanted:
@@ -105,7 +105,7 @@ class FinalMaps:
 async def _map_all(live: LiveMission) -> None:
     await live.journal.flush()
     await live.pings.move()
-    await live.build_map()
+    await live.map.build()
     live.publish_summary()
     if belongs_to_a_site(live):
         # Before the soundings leave memory.

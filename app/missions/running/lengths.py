@@ -115,7 +115,7 @@ def _check_state(live: LiveMission) -> None:
 
 
 def _refuse_flown_out(live: LiveMission) -> None:
-    if live.header.state is MissionState.RUNNING and live.flown_out:
+    if live.header.state is MissionState.RUNNING and live.flight.flown_out:
         raise ConflictError("the mission was just flown to its end", "create a new mission to go on")
 
 

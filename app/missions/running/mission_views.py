@@ -31,7 +31,7 @@ def mission_view(live: LiveMission) -> MissionView:
         waypoints=live.waypoints.newest,
         current=live.vehicles.current(),
         targets=live.target_views(),
-        has_reference=live.reference_m is not None,
+        has_reference=live.map.reference_m is not None,
     )
 
 

@@ -269,7 +269,7 @@ class MissionRegistry:
         """Remove a mission with everything that belongs to it. What was measured is kept: then ConflictError."""
         if live.header.state in AT_SEA:
             raise ConflictError(f"the mission is {live.header.state}", "finish or abort it first")
-        counts = live.journal.counts
+        counts = live.counts
         _refuse_measured(live.header.step, counts.accepted + counts.rejected, counts.pings + counts.rejected_pings)
         async with live.database.reading() as session:
             # What was taken back is kept as well.

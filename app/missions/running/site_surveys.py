@@ -32,9 +32,9 @@ async def keep_survey(live: LiveMission) -> None:
     await live.journal.flush()
     await live.notice_imports()
     if not _is_mapped(live):
-        await live.build_map()
+        await live.map.build()
     made_of = _made_of(live)
-    own = await live.mapped(live.builder.own_map)
+    own = await live.map.make(live.builder.own_map)
     period = await _period(live)
     if own is None or period is None:
         survey, content = None, b""
@@ -42,7 +42,7 @@ async def keep_survey(live: LiveMission) -> None:
         survey = survey_of(own, period[1], live.facts.common_sd_m)
         content = await live.in_background(pack_survey, survey, live.frame)
     async with live.journal.writing:
-        if live.map_is_missing or live.builder.arrivals.at_rest or made_of != _made_of(live):
+        if live.map.is_missing or live.builder.arrivals.at_rest or made_of != _made_of(live):
             return  # Something else is the case by now.
         await to_the_end(_store(live, survey, content, period or (0.0, 0.0)))
 
@@ -50,7 +50,7 @@ async def keep_survey(live: LiveMission) -> None:
 def _is_mapped(live: LiveMission) -> bool:
     """Tell whether the newest map is a product of all soundings, and these are in memory."""
     built = live.builder.newest
-    return built is not None and built.thorough and not live.map_is_missing and not live.builder.arrivals.at_rest
+    return built is not None and built.thorough and not live.map.is_missing and not live.builder.arrivals.at_rest
 
 
 def _made_of(live: LiveMission) -> tuple[int, int, int]:
@@ -98,8 +98,8 @@ def _summary(live: LiveMission, survey: Survey | None) -> dict[str, Any]:
     found: dict[str, Any] = {
         "cells": 0,
         "cell_m": live.spec.cell_m,
-        "soundings": live.journal.counts.accepted,
-        "beams": live.journal.counts.beams,
+        "soundings": live.counts.accepted,
+        "beams": live.counts.beams,
         "datum_epsg": datum.epsg,
         "vertical_datum": datum.statement,
     }

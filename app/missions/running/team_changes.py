@@ -121,7 +121,7 @@ class TeamChanges:
 
 async def _refuse_another_mounting(live: LiveMission, vehicle: VehicleSpec) -> None:
     """Refuse a vehicle whose sonar is stated to be mounted otherwise than where it sounded before."""
-    if vehicle.mounting == live.stated_mountings.get(vehicle.name, MountingSpec()):
+    if vehicle.mounting == live.corrections.stated_mountings.get(vehicle.name, MountingSpec()):
         return
     async with live.database.reading() as session:
         sounded = await sounding_queries.vehicles_of(session, live.id)

@@ -83,7 +83,7 @@ async def ensonified(live: LiveMission, share_pct: float) -> None:
 async def test_a_mission_sees_all_of_its_area_and_ends_by_itself(harbour: Harbour) -> None:
     live = await started(harbour)
     await until_state(harbour.service, live.id, MissionState.FINISHED)
-    built = await live.build_map()
+    built = await live.map.build()
     progress = live.progress()
     assert built is not None
     assert progress.ensonified_pct is not None
@@ -103,7 +103,7 @@ async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Har
     await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(45.0, 45.0)), "Ana")
     await until_state(harbour.service, live.id, MissionState.FINISHED)
     assert [order.state for order in await orders_of(live)] == [OrderState.DONE]
-    await live.build_map()  # what was seen on the last legs is in no map yet
+    await live.map.build()  # what was seen on the last legs is in no map yet
     progress = live.progress()
     assert progress.holidays == 0
     assert (progress.ensonified_pct or 0.0) > 99.0
@@ -170,7 +170,7 @@ async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour)
     seen = again.builder.swath.beams
     assert seen >= 0.95 * again.progress().beams, "all but spikes"
     await until_state(harbour.service, live.id, MissionState.FINISHED)
-    await again.build_map()
+    await again.map.build()
     progress = again.progress()
     assert progress.ensonified_pct is not None
     assert progress.ensonified_pct > 99.0
@@ -198,7 +198,7 @@ async def test_nothing_is_left_only_where_nothing_is_expected_of_legs_that_were_
     vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0}
     live = await started(harbour_closed, vehicles=[vehicle])
     await until_state(harbour_closed.service, live.id, MissionState.FINISHED)
-    await live.build_map()
+    await live.map.build()
     assert expecting
     assert live.header.reason == "nothing is left to ensonify"
     assert (live.progress().ensonified_pct or 0.0) > 99.0
@@ -238,13 +238,13 @@ async def test_pings_are_placed_anew_when_the_tide_is_known(harbour: Harbour) ->
     for number in range(20):
         live.receive(ping(number, heading_rad=0.0))
     await live.journal.flush()
-    built = await live.build_map()
+    built = await live.map.build()
     assert built is not None
     before = built.map.depth_m.copy()
     spec = live.spec.model_copy(update={"tide": Tide(level_m=1.5, source="gauge")})
     corrections = type(live.gate.corrections)(live.frame, spec.tide)
     live.recorrect(spec, corrections, live.journal.counts)
-    after = await live.build_map()
+    after = await live.map.build()
     assert after is not None
     seen = np.isfinite(before)
     assert seen.any()
@@ -259,7 +259,7 @@ async def test_vehicles_keep_a_height_above_a_bottom_that_falls_away(harbour_clo
     vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0, "altitude_m": 4.0}
     live = await started(harbour, vehicles=[vehicle])
     await until_state(harbour.service, live.id, MissionState.FINISHED)
-    built, progress = await live.build_map(), live.progress()
+    built, progress = await live.map.build(), live.progress()
     assert built is not None
     assert progress.ensonified_pct is not None
     assert progress.ensonified_pct > 99.0
@@ -301,7 +301,7 @@ async def test_a_sonar_that_is_simulated_askew_is_put_right_after_the_mission(ha
 
     async def spread_m() -> float:
         """How far the cells of a floor that is flat lie apart."""
-        built = await live.build_map()
+        built = await live.map.build()
         assert built is not None
         return float(np.nanstd(built.map.depth_m[built.map.sounded]))
 

@@ -126,7 +126,7 @@ class Decider:
         refusals = {leg.vehicle: leg.refusal for leg in decisions[0].legs if leg.refusal}
         if len(refusals) < len(decisions[0].legs) or not decisions[0].legs:
             self._told = {}
-            if self._live.standstill:
+            if self._live.flight.standstill:
                 self._live.stand_still("")
             if self._live.journal.alarms.standing([AlarmKind.NO_WAYPOINT]):
                 await self._live.journal.end([AlarmKind.NO_WAYPOINT], "a vehicle can be sent on again")

@@ -102,7 +102,7 @@ class StepMaps:
         before = live.builder.newest
         built = await loop.run_in_executor(self._executor, live.builder.build)
         if built is not None and built is not before:
-            live.publish_map(built)
+            live.map.publish(built)
         self._made_at_s = loop.time()
         self._took_s = self._made_at_s - started_s
         await live.stored_soundings.keep_when_grown(live.header.step)

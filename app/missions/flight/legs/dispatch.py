@@ -72,7 +72,7 @@ class Dispatch:
             under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy and not m.left_alone}
             late = await self.settle_late()
             holds_s = await self._hold_idle()
-            if late or (self._waiting and not self._live.halted):
+            if late or (self._waiting and not self._live.flight.halted):
                 continue
             self._live.changed.clear()
             try:
@@ -109,7 +109,7 @@ class Dispatch:
         for member in self._live.team:
             flies = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
             idle = flies and member.plannable and member.legs and not member.ordered and not member.ahead
-            if not idle or self._live.halted:
+            if not idle or self._live.flight.halted:
                 self._idle_since_s.pop(member.name, None)
                 continue
             hold_s = self._idle_since_s.setdefault(member.name, now_s) + HOLD_AFTER_S / self._time_scale
@@ -146,7 +146,7 @@ class Dispatch:
         """Send every vehicle that flies nothing its next leg, unless something bars that from where it is now."""
         beginning = []
         for member in self._live.team:
-            if self._live.halted or member.ordered or not member.ahead:
+            if self._live.flight.halted or member.ordered or not member.ahead:
                 continue
             barred = self._leg_commit.barred(member)
             if barred:
@@ -161,7 +161,7 @@ class Dispatch:
 
     async def send(self, member: Member) -> None:
         """Send a vehicle its order; one that refuses is asked to follow anew, and then sent it again."""
-        if member.order is None or self._live.halted:
+        if member.order is None or self._live.flight.halted:
             return
         try:
             await self._hub.order(member.key, member.order)

@@ -56,7 +56,7 @@ class LegExchange:
     async def look(self) -> bool:
         """Decide the legs that are not begun anew, if there is a newer map than last time; whether any changed."""
         live = self._live
-        if live.builder.newest is self._looked_at or live.halted:
+        if live.builder.newest is self._looked_at or live.flight.halted:
             return False
         old = {member.name: legs for member in live.team.plannable if (legs := self._open_legs(member))}
         planner = self._decider.planner

@@ -65,7 +65,7 @@ class GivingWay:
         """Keep vehicles apart from each other and from other missions', until cancelled."""
         with self._others.flown(self.led):
             while True:
-                if not self._live.halted and self._live.spec.limits.min_separation_m > 0.0:
+                if not self._live.flight.halted and self._live.spec.limits.min_separation_m > 0.0:
                     await self.look()
                 await until_next_look(self._time_scale)
 

@@ -85,7 +85,7 @@ class KeepingOff:
     async def keep(self) -> None:
         """Keep vehicles off zones, where there are any, until cancelled."""
         while self._live.spec.keep_out:
-            if not self._live.halted:
+            if not self._live.flight.halted:
                 await self.look()
             await until_next_look(self._time_scale)
 

@@ -22,11 +22,11 @@ class LengthChange:
     @property
     def is_due(self) -> bool:
         """Whether legs are not fitted yet to the length that the mission has now."""
-        return self._live.fitted_budget != self._live.spec.budget
+        return not self._live.legs_fit_length
 
     async def fit(self) -> None:
         """Take legs back that are not begun and end beyond the end that the mission has now."""
-        self._live.fitted_budget = self._live.spec.budget
+        self._live.note_legs_fitted()
         await self.take_back_beyond(begun=False)
 
     async def take_back_beyond(self, *, begun: bool) -> None:

@@ -121,7 +121,7 @@ class OtherVehicles:
 
         Who keeps none apart would send nobody on that was led aside.
         """
-        return None if live.halted or live.spec.limits.min_separation_m <= 0.0 else self._led.get(live.id)
+        return None if live.flight.halted or live.spec.limits.min_separation_m <= 0.0 else self._led.get(live.id)
 
     def about(self, live: LiveMission) -> list[OtherVehicle]:
         """Return the vehicles about that a mission does not lead."""
@@ -130,12 +130,12 @@ class OtherVehicles:
         others = [
             _led_elsewhere(member, led, member.report)
             for led in self._led.values()
-            if led.live is not live and not led.live.halted
+            if led.live is not live and not led.live.flight.halted
             for member in led.live.team
             if member.report is not None and is_out(member) and not member.capabilities.simulated
         ]
         self._look()
-        leading = {live.id, *(led.live.id for led in self._led.values() if not led.live.halted)}
+        leading = {live.id, *(led.live.id for led in self._led.values() if not led.live.flight.halted)}
         # One of this name that another link hears of is the same vehicle.
         names = {member.name for member in live.team}
         others += [

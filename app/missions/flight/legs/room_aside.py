@@ -69,7 +69,7 @@ class RoomAside:
 
     def may_give_way(self, member: Member) -> bool:
         """Whether a vehicle can be led aside now."""
-        if self._live.halted:
+        if self._live.flight.halted:
             return False
         return self._asides.may_lead(member, Because.VEHICLE) or self._asides.may_stand_elsewhere(member)
 

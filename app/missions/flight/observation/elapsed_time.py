@@ -27,10 +27,9 @@ async def keep_time(live: LiveMission) -> None:
 
 async def save_elapsed(live: LiveMission) -> None:
     """Store the seconds since the last time; those that cannot be stored count the next time."""
-    loop_time = asyncio.get_running_loop().time()
-    if live.running_since_s is None:
+    if not live.running:
         return
-    seconds = loop_time - live.running_since_s
+    seconds = live.flight.unstored_s
     try:
         async with live.database.writing() as session:
             await mission_queries.add_elapsed(session, live.id, seconds, now())

@@ -130,7 +130,7 @@ class Engagement:
 
     async def _ask(self, member: Member) -> None:
         live = self._live
-        if live.halted:
+        if live.flight.halted:
             return
         was_lost = self._hub.info(member.key).state is LinkState.LOST
         try:

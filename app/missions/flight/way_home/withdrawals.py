@@ -88,7 +88,7 @@ class Withdrawals:
     async def look(self) -> None:
         """Lead each of them once."""
         for member in self._live.team:
-            if member.withdrawal is not None and not member.withdrawal.over and not self._live.halted:
+            if member.withdrawal is not None and not member.withdrawal.over and not self._live.flight.halted:
                 try:
                     await self._lead(member, member.withdrawal)
                 except Exception:

@@ -163,7 +163,9 @@ async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings, Plac
 
     await read_in_pieces(live.database, sounding_queries.track_query(live.id), take)
     # As they would be placed without an adjustment.
-    place = Corrections.of(live.spec, live.frame, before.table, None, live.stated_mountings, before.rulings).placing()
+    place = Corrections.of(
+        live.spec, live.frame, before.table, None, live.corrections.stated_mountings, before.rulings
+    ).placing()
     async for vehicle, pings in live.pings.all_accepted(await live.pings.newest_block()):
         found = await asyncio.to_thread(_of_pings, live, vehicle, number_of(vehicle), pings, place, cell_m)
         if found is not None:

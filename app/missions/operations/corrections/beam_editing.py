@@ -76,7 +76,7 @@ async def rule_beams(live: LiveMission, request: BeamRulingRequest, ruling: Ruli
     async def store(session: AsyncSession) -> Mapping[int, BeamEdit]:
         session.add(row)
         await session.flush()
-        return {**live.beam_edits, row.id: edit}
+        return {**live.corrections.beam_edits, row.id: edit}
 
     await _change(live, store)
     view = _view(row.id, edit)
@@ -93,7 +93,7 @@ def beam_edits(live: LiveMission) -> BeamEditsView:
     return BeamEditsView(
         rejected=rulings.rejected_beams,
         restored=rulings.restored_beams,
-        edits=[_view(number, edit) for number, edit in live.beam_edits.items()],
+        edits=[_view(number, edit) for number, edit in live.corrections.beam_edits.items()],
     )
 
 
@@ -102,16 +102,16 @@ async def withdraw_edit(live: LiveMission, number: int, actor: str) -> BeamEdits
 
     Raises BeamEditNotFoundError.
     """
-    edit = live.beam_edits.get(number)
+    edit = live.corrections.beam_edits.get(number)
 
     async def store(session: AsyncSession) -> Mapping[int, BeamEdit]:
-        if edit is None or number not in live.beam_edits:
+        if edit is None or number not in live.corrections.beam_edits:
             raise BeamEditNotFoundError(
                 f"there is no edit {number} of beams in this mission",
                 "GET /api/v1/missions/{id}/beams/edits lists them",
             )
         await session.execute(delete(BeamEditRow).where(BeamEditRow.id == number))
-        return {other: one for other, one in live.beam_edits.items() if other != number}
+        return {other: one for other, one in live.corrections.beam_edits.items() if other != number}
 
     await _change(live, store)
     words = f"edit {number} of beams ({edit.ruling if edit else ''}) is taken back by {actor}"

@@ -52,7 +52,7 @@ class CastUse:
         await live.journal.flush()
         casts, built = live.gate.corrections.casts, live.builder.newest
         # A ruling changes no count, but there is another map after it.
-        key = (casts, live.journal.counts, built and built.version)
+        key = (casts, live.counts, built and built.version)
         if key != self._key:
             speed = live.spec.sound_speed
             self._found = _Used(speed, () if casts is None else await _counted(live, casts))
@@ -125,7 +125,7 @@ async def _counted(live: LiveMission, casts: Casts) -> list[_Tally]:
         sounding_queries.cast_query(live.id),
         lambda piece: count(piece[:, 0], piece[:, 1], piece[:, 2], are_pings=False),
     )
-    if live.journal.counts.pings:
+    if live.counts.pings:
         async for _, pings in live.pings.all_accepted():
             await asyncio.to_thread(count, pings.time_s, pings.lat_deg, pings.lon_deg, are_pings=True)
     return tallies

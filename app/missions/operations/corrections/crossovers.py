@@ -98,7 +98,7 @@ async def survey_check(live: LiveMission) -> SurveyCheck:
     until = await live.pings.newest_block()
     tracks = await survey_tracks(live, until)
     check = await asyncio.to_thread(SurveyCheck.of, tracks)
-    if not live.journal.counts.pings or not check.is_crossline.any():
+    if not live.counts.pings or not check.is_crossline.any():
         return check
     place = live.gate.corrections.placing()
     main = DensityGrid(live.builder.grid, live.builder.mask)

@@ -84,7 +84,7 @@ class _Turn:
 async def _estimate(live: LiveMission, vehicle: str, errors: LineErrors) -> MountingEstimateView:
     await live.journal.flush()
     until, corrections = await live.pings.newest_block(), live.gate.corrections
-    applied = live.spec.mountings.get(vehicle) or live.stated_mountings.get(vehicle, MountingSpec())
+    applied = live.spec.mountings.get(vehicle) or live.corrections.stated_mountings.get(vehicle, MountingSpec())
     track = _Track(live)
     async for name, pings in live.pings.all_accepted(until):
         if name == vehicle:

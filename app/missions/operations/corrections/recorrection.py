@@ -70,14 +70,14 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
         rejected_beams=rulings.rejected_beams,
         restored_beams=rulings.restored_beams,
         vertical_datum=live.facts.vertical_datum.statement,
-        accepted=live.journal.counts.accepted,
-        rejected=live.journal.counts.rejected,
+        accepted=live.counts.accepted,
+        rejected=live.counts.rejected,
     )
 
 
 def _mountings(live: LiveMission) -> list[MountingView]:
     """Return how sonars are mounted, of the vehicles that take part, in their order, then of others by name."""
-    stated, corrected = live.stated_mountings, live.spec.mountings
+    stated, corrected = live.corrections.stated_mountings, live.spec.mountings
     names = [member.name for member in live.team]
     names += sorted((stated.keys() | corrected.keys()) - set(names))
     return [
@@ -181,7 +181,7 @@ async def set_mounting(live: LiveMission, vehicle: str, mounting: MountingSpec |
     """
     await check_who_sounded(live, vehicle)
     async with live.correcting:
-        applied = live.stated_mountings.get(vehicle, MountingSpec()) if mounting is None else mounting
+        applied = live.corrections.stated_mountings.get(vehicle, MountingSpec()) if mounting is None else mounting
         if not applied.is_ideal:
             files = await placed_files(live, vehicle)
             if files:
@@ -213,7 +213,7 @@ async def check_who_sounded(live: LiveMission, vehicle: str) -> None:
 async def placed_files(live: LiveMission, vehicle: str) -> list[str]:
     """Return the multibeam's own files whose beams came placed, of one vehicle; also those that are being read."""
     stored = [file for file, own in (await _multibeam_files(live)).items() if own == vehicle]
-    return sorted({*stored, *live.placed_files_being_read(vehicle)})
+    return sorted({*stored, *live.placed_files.being_read(vehicle)})
 
 
 def check_casts(live: LiveMission, sound_speed: SoundSpeed) -> None:
@@ -288,7 +288,7 @@ async def recorrect(
     store: Callable[[AsyncSession], Awaitable[None]],
 ) -> None:
     """Correct every stored sounding anew; ``store`` writes what else changes. The caller holds ``correcting``."""
-    corrections = Corrections.of(spec, live.frame, table, adjustment, live.stated_mountings, None)
+    corrections = Corrections.of(spec, live.frame, table, adjustment, live.corrections.stated_mountings, None)
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
@@ -304,9 +304,9 @@ async def recorrect(
             counted = await sounding_queries.counts(session, live.id)
         # Committed: from here on nothing waits until all of it holds. Who joined meanwhile has sounded nothing yet.
         corrections = Corrections.of(
-            spec, live.frame, table, adjustment, live.stated_mountings, live.gate.corrections.rulings
+            spec, live.frame, table, adjustment, live.corrections.stated_mountings, live.gate.corrections.rulings
         )
-        counts = live.journal.counts.of_soundings(counted.get("accepted", 0), counted.get("rejected", 0))
+        counts = live.counts.of_soundings(counted.get("accepted", 0), counted.get("rejected", 0))
         live.recorrect(spec, corrections, counts)
     live.changed.set()
     live.publish_summary()

@@ -92,7 +92,7 @@ async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, *, note: str
     if line is not None:
         live.journal.tell(line)
         live.changed.set()
-    await live.build_map()
+    await live.map.build()
     live.publish_summary()
     async with live.database.reading() as session:
         row = await session.get_one(SoundingRow, sounding_id)
@@ -113,7 +113,7 @@ async def rule_many(
     if line is not None:
         live.journal.tell(line)
         live.changed.set()
-        await live.build_map()
+        await live.map.build()
         live.publish_summary()
     return result
 
@@ -162,7 +162,7 @@ async def _store_many(
         session.add(line)
         await session.flush()
         await stored_maps.forget(session, live.id)
-    counts = live.journal.counts
+    counts = live.counts
     live.recount(counts.of_soundings(counts.accepted + accepted, counts.rejected - accepted))
     return line, result
 
@@ -233,7 +233,7 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
         await session.flush()
         await stored_maps.forget(session, live.id)
     # To count all of them again takes seconds where there are millions.
-    counts, more = live.journal.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
+    counts, more = live.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
     live.recount(counts.of_soundings(counts.accepted + more, counts.rejected - more))
     return line
 

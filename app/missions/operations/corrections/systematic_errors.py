@@ -52,7 +52,7 @@ async def systematic_errors(live: LiveMission, snapshot: MapSnapshot) -> Systema
     """Return what lines that cross, and swaths that overlap, show. Raises PingsUnreadableError."""
     check = (await check_of(live, snapshot)).check
     levels = await asyncio.to_thread(_levels, check)
-    tilts = await _tilts(live, levels, check) if live.journal.counts.pings else {}
+    tilts = await _tilts(live, levels, check) if live.counts.pings else {}
     assumed_mps = ASSUMED_MPS if live.spec.sound_speed is None else live.spec.sound_speed.assumed_mps
     errors = [*_of_levels(levels, check.names), *_of_swaths(tilts, assumed_mps)]
     return SystematicErrorsView(

@@ -310,7 +310,7 @@ class Imports:
             async with live.database.writing() as session:
                 await _forget_reference(session, live.id)
                 session.add(row)
-            live.show_reference(depths)
+            live.map.show_reference(depths)
         await live.journal.log(Level.INFO, "import", f"reference grid {options.filename} set by {actor}", actor=actor)
         await _warn(live, options.filename, view.notes, actor)
         return view
@@ -321,7 +321,7 @@ class Imports:
             await reference_of(live)
             async with live.database.writing() as session:
                 await _forget_reference(session, live.id)
-            live.show_reference(None)
+            live.map.show_reference(None)
         await live.journal.log(Level.INFO, "import", f"reference grid taken away by {actor}", actor=actor)
 
 
@@ -442,7 +442,7 @@ async def _off_by(live: LiveMission, kept: NDArray[np.float64]) -> list[str]:
     def take(rows: Sequence[Any]) -> None:
         own.append(np.array([tuple(row)[:4] for row in rows], dtype=float).reshape(-1, 4))
 
-    if live.journal.counts.accepted:
+    if live.counts.accepted:
         await read_in_pieces(live.database, sounding_queries.accepted_query(live.id), take)
     grid = live.builder.grid
     off = await asyncio.to_thread(lambda: offset_between(grid, *map(Soundings.of_rows, (np.concatenate(own), kept))))

@@ -205,7 +205,7 @@ class LogImport:
         self._earlier_key = ""
         """What its keys begin with where an earlier version stored the begin of it."""
         # A gate of its own: the log may lie hours before or after what the vehicle sends now.
-        self._gate = live.make_gate()
+        self._gate = live.corrections.make_gate()
         self._tally = Tally()
 
     async def run(self, *, actor: str, progress: Progress | None = None, import_id: str = "") -> LogImportView:

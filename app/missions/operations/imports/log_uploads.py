@@ -307,7 +307,7 @@ class LogUploads:
         live = await self._get(job.mission_id)
         if job.vehicle is None or not is_multibeam(job.file):
             return await self._read_into(live, job, upload)
-        with live.reading_placed(job.file, job.vehicle):
+        with live.placed_files.reading(job.file, job.vehicle):
             return await self._read_into(live, job, upload)
 
     async def _read_into(self, live: LiveMission, job: _Job, upload: Upload) -> LogImportView:

@@ -139,7 +139,7 @@ class MapPictures:
     async def _newest(self, live: LiveMission, maps: FinalMaps) -> _View:
         snapshot = None
         if live.running:
-            snapshot = await asyncio.get_running_loop().run_in_executor(self._executor, live.live_snapshot)
+            snapshot = await asyncio.get_running_loop().run_in_executor(self._executor, live.map.live_snapshot)
         if snapshot is None:
             try:
                 snapshot = await newest_map(live, maps, patient=False)

@@ -54,18 +54,18 @@ async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True
     was made of was taken back.
     """
     built = live.builder.newest
-    if not patient and built is not None and maps.busy(live.id) and live.journal.counts.any_accepted:
-        return live.snapshot(built)
+    if not patient and built is not None and maps.busy(live.id) and live.counts.any_accepted:
+        return live.map.snapshot(built)
     await maps.last(live.id)
     await live.notice_imports()
     built = live.builder.newest
-    if built is None or (live.map_is_missing and not (live.running and live.journal.counts.any_accepted)):
-        built = await live.build_map()
+    if built is None or (live.map.is_missing and not (live.running and live.counts.any_accepted)):
+        built = await live.map.build()
     if built is None:
         raise MapNotReadyError(
             "no sounding was accepted yet, so there is no map", "start the mission or post measurements"
         )
-    return live.snapshot(built)
+    return live.map.snapshot(built)
 
 
 async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
@@ -81,23 +81,23 @@ async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
             "step", f"{step} is none of the mission's steps yet: its last is {live.header.step}", "give an earlier one"
         )
     if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
-        await live.build_map()
+        await live.map.build()
     found = await accepted(live.database, live.id, 0, until_step=step)
     newest = live.builder.newest
     if newest is None:
         raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
     swath = live.builder.swath.empty()
-    if live.journal.counts.beams:
+    if live.counts.beams:
         async for vehicle, pings in live.pings.all_accepted(until_step=step):
             await asyncio.to_thread(swath.add, vehicle, pings)
     try:
-        bathymetry = await live.mapped(live.builder.as_of, found.table, swath)
+        bathymetry = await live.map.make(live.builder.as_of, found.table, swath)
     except ValueError:
         raise MapNotReadyError(
             f"no sounding was accepted until the end of step {step}", "choose a later step"
         ) from None
     built = BuiltMap(newest.version, len(found.table), bathymetry, newest.digest)
-    return MapSnapshot(live.facts, built, step, live.reference_m, live.revision)
+    return live.map.snapshot_at(built, step)
 
 
 async def map_tiles(
@@ -110,13 +110,13 @@ async def map_tiles(
     snapshot = None
     if step is not None:
         snapshot = await map_at_step(live, step)
-    elif live.running and live.journal.counts.any_accepted:
+    elif live.running and live.counts.any_accepted:
         # Not with the planning threads, which a decision may keep for seconds.
-        snapshot = await asyncio.to_thread(live.live_snapshot)
+        snapshot = await asyncio.to_thread(live.map.live_snapshot)
     if snapshot is None:
         snapshot = await newest_map(live, maps, patient=False)
     tag = f"{run}.{snapshot.tag}" + ("" if step is None else f"@{step}")
-    return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
+    return await live.map.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
 
 
 async def export(

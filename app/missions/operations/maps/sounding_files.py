@@ -112,7 +112,7 @@ async def point_cloud(live: LiveMission, frame: ProjectedFrame) -> FileContent:
 
 def _left_out(live: LiveMission) -> str:
     """Return what of a mission's measurements is in no file of soundings; empty: nothing."""
-    pings = live.journal.counts.pings
+    pings = live.counts.pings
     return (
         f"the beams of {pings} pings of swath sonars are not among these: see pings, or soundings.laz" if pings else ""
     )

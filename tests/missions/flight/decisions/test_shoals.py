@@ -60,5 +60,5 @@ async def test_a_survey_goes_round_shoals_and_maps_the_ground_between_them(
     await until_state(service, mission, MissionState.FINISHED)
     for name, way in places.items():
         assert longest_stay(way) < 90, name
-    await live.build_map()
+    await live.map.build()
     assert (live.progress().coverage_pct or 0.0) > 60.0

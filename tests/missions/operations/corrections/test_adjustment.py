@@ -30,7 +30,7 @@ async def test_a_restart_places_soundings_as_before_it_and_an_undo_as_they_came(
     mission = (await harbour.service.create(make_spec())).id
 
     async def depths() -> FloatArray:
-        built = await (await harbour.service.get(mission)).build_map()
+        built = await (await harbour.service.get(mission)).map.build()
         assert built is not None
         return built.map.depth_m
 

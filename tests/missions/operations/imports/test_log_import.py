@@ -139,7 +139,7 @@ async def test_pings_of_a_log_count_once_and_are_on_the_map(
     live = await service.get(mission.id)
     assert (live.progress().pings, live.progress().beams) == (10, 10 * writer.BEAMS)
     assert (await take(service, mission.id, log)).known
-    await live.build_map()
+    await live.map.build()
     assert live.progress().ensonified_pct
     assert live.progress().pings == 10
     events = await events_after(live)
