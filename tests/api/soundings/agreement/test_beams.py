@@ -135,10 +135,17 @@ async def test_no_file_and_no_figure_has_beams_that_were_taken_out(client: httpx
         cloud = await asyncio.to_thread(laspy.read, io.BytesIO(answer.content))
         return int((np.array(cloud.z) > -9.0).sum())
 
+    async def ensonified_pct() -> float:
+        await the_map(client, path)
+        return float((await client.get(path)).json()["progress"]["ensonified_pct"])
+
     assert await shoal_points() > 20
+    before = await ensonified_pct()
     await ruled(client, path, "reject", selection=IN_SCHOOL)
     assert await shoal_points() == 0
     assert (await client.get(f"{path}/corrections")).json()["rejected_beams"] > 20
+    # Behind the fish nobody has seen the bottom.
+    assert await ensonified_pct() < before
 
 
 async def test_of_many_beams_those_of_some_pings_are_shown(client: httpx.AsyncClient) -> None:
