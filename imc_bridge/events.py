@@ -277,6 +277,7 @@ BridgeEvent = (
     | SwathPing
     | PingRefused
     | TargetRange
+    | SoundSpeedSample
     | WaypointChange
     | LinkChange
     | Restarted

@@ -37,6 +37,7 @@ from imc_bridge.nodes.node import Node, listed_entities
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.telemetry.soundings import offer_distance
+from imc_bridge.telemetry.water import MESSAGES as WATER_MESSAGES
 
 BLOCK_BYTES = 1 << 20
 GZIP_MAGIC = b"\x1f\x8b"
@@ -60,15 +61,12 @@ OWN = (
     "EntityInfo",
     "FuelLevel",
     "SonarData",
-    "SoundSpeed",
+    *WATER_MESSAGES,
 )
 IDENTIFYING = ("Announce", "EntityList", "EntityInfo")
 VEHICLE_SENDS = message_ids(("EstimatedState",))
 
 LogEvent = StateReport | Sounding | SoundingRefused | SwathPing | PingRefused | SoundSpeedSample
-
-STATE_GAP_S = 2.0
-"""A probe's speed is of the place of the last state where that is no older than this."""
 
 
 class LogError(Exception):
@@ -344,6 +342,7 @@ def _placed(node: Node) -> Iterator[LogEvent]:
     """Yield what became of what was measured before the last state."""
     yield from node.intake.resolve(node.history, node.position_sd_m())
     yield from node.pings.resolve(node.history, node.position_sd_m())
+    yield from node.water.resolve(node.history)
 
 
 def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
@@ -363,19 +362,8 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
             lost = node.pings.offer(node.entity_name(header.src_ent), message)
             if lost is not None:
                 yield lost
-        case "SoundSpeed":
-            last, time_s = node.report, message.timestamp
-            # A negative one is DUNE's word for none.
-            if last is not None and 0.0 <= time_s - last.time_s <= STATE_GAP_S and message.value > 0.0:
-                yield SoundSpeedSample(
-                    vehicle=node.name,
-                    time_s=time_s,
-                    lat_deg=last.lat_deg,
-                    lon_deg=last.lon_deg,
-                    depth_m=last.depth_m,
-                    speed_mps=float(message.value),
-                    source=node.entity_name(header.src_ent) or "",
-                )
+        case name if name in WATER_MESSAGES:
+            node.water.offer(name, node.entity_name(header.src_ent), message)
         case "NavigationUncertainty":
             node.take_uncertainty(message)
         case "FuelLevel":

@@ -25,6 +25,7 @@ from imc_bridge.telemetry.faults import is_leak_sensor
 from imc_bridge.telemetry.ranges import MESSAGES as RANGE_MESSAGES
 from imc_bridge.telemetry.soundings import offer_distance
 from imc_bridge.telemetry.swaths import bottom_below
+from imc_bridge.telemetry.water import MESSAGES as WATER_MESSAGES
 
 WANTED = (
     "Abort",
@@ -46,6 +47,7 @@ WANTED = (
     "VehicleMedium",
     "VehicleState",
     *RANGE_MESSAGES,
+    *WATER_MESSAGES,
 )
 ENTITY_STATE = int(imcpy.EntityState().msg_id)
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
@@ -315,6 +317,8 @@ class Receiver:
                 node.take_uncertainty(message)
             case _ if name in RANGE_MESSAGES:
                 node.ranges.offer(name, message)
+            case _ if name in WATER_MESSAGES:
+                node.water.offer(name, node.entity_name(int(message.src_ent)), message)
             case "PlanControlState" if node.in_order(name, message.timestamp):
                 if node.take_plan_state(message, now):
                     node.restarted()
@@ -374,6 +378,8 @@ class Receiver:
             self._tell(ping)
         for measured in node.ranges.resolve(node.history, node.position_sd_m()):
             self._tell(measured)
+        for water in node.water.resolve(node.history):
+            self._tell(water)
 
     def _tell_fault(self, fault: Fault | None) -> None:
         if fault is not None:

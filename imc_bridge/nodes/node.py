@@ -29,6 +29,7 @@ from imc_bridge.telemetry.positions import told_place
 from imc_bridge.telemetry.ranges import RangeIntake
 from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
 from imc_bridge.telemetry.swaths import PingIntake
+from imc_bridge.telemetry.water import WaterIntake
 
 UNCERTAINTY_VALID_S = 10.0
 CURRENT_VALID_S = 3600.0
@@ -144,7 +145,7 @@ class Node:
         """For how long it has been in contact since without telling that; silence does not count."""
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
         self.pings = PingIntake(name)
-        self.ranges = RangeIntake(name)
+        self.ranges, self.water = RangeIntake(name), WaterIntake(name)
         self.faults = Faults(name)
         self._uncertainty: tuple[float, float] | None = None
         self._current: tuple[float, float, float] | None = None
@@ -272,6 +273,7 @@ class Node:
             self.intake.clear()
             self.pings.clear()
             self.ranges.clear()
+            self.water.clear()
             self._uncertainty = None
             self._current = None
             self.faults.clock_jumped()

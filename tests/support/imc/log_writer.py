@@ -74,14 +74,19 @@ def sound_speed_mps(depth_m: float) -> float:
     return 1512.0 - 0.5 * depth_m
 
 
+def dive_depth_m(after_s: float, deepest_m: float, seconds: int) -> float:
+    """How deep a vehicle is that long after a dive began."""
+    return deepest_m * (1.0 - abs(2.0 * after_s / seconds - 1.0))
+
+
 def dive(begin_s: float, deepest_m: float, seconds: int) -> Iterator[bytes]:
     """Down and up again, evenly, with a speed of sound each second and one that is none."""
     for tick in range(seconds):
         time_s = begin_s + tick
-        depth_m = deepest_m * (1.0 - abs(2.0 * tick / seconds - 1.0))
-        yield state(time_s, 0.0, depth_m=depth_m)
-        yield sound_speed(time_s + 0.1, sound_speed_mps(depth_m))
+        yield state(time_s, 0.0, depth_m=dive_depth_m(tick, deepest_m, seconds))
+        yield sound_speed(time_s + 0.1, sound_speed_mps(dive_depth_m(tick + 0.1, deepest_m, seconds)))
         yield sound_speed(time_s + 0.2, -1.0)
+    yield state(begin_s + seconds, 0.0, depth_m=0.0)
 
 
 def announce(time_s: float, name: str = NAME, src: int = VEHICLE_ID) -> bytes:
