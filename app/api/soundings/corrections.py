@@ -4,6 +4,7 @@ from contextlib import suppress
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
+from pydantic import AwareDatetime
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
@@ -100,9 +101,18 @@ async def get_casts(service: Service, reader: Reader, mission: Mission, order: S
     summary="See the sound speed casts that vehicles measured",
     responses=problems("mission-not-found", "invalid-request"),
 )
-async def get_measured_casts(reader: Reader, mission: Mission) -> list[VehicleCastView]:
-    """Return the casts in vehicles' logs that were imported, oldest first. None counts before it is added."""
-    return await measured_casts.vehicles_casts(mission)
+async def get_measured_casts(
+    reader: Reader,
+    mission: Mission,
+    vehicle: Annotated[VehicleName | None, Query(description="Whose; default: of all")] = None,
+    since: Annotated[AwareDatetime | None, Query(description="Of what was measured from then on")] = None,
+    until: Annotated[AwareDatetime | None, Query(description="Of what was measured until then")] = None,
+) -> list[VehicleCastView]:
+    """Return the casts that vehicles measured, as they sent them and in logs that were imported, oldest first.
+
+    None counts before it is added. Where a log was imported, it stands for what its vehicle sent meanwhile.
+    """
+    return await measured_casts.vehicles_casts(mission, vehicle=vehicle, since=since, until=until)
 
 
 @router.post(

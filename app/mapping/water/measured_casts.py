@@ -27,6 +27,12 @@ BIN_M, MOST_BINS = 0.5, 100
 LEAST_SAMPLES = 3
 """Fewer in a bin tell no median."""
 
+LEVEL_M = 0.05
+"""What changes its depth by less from one sample to the next goes neither down nor up."""
+
+LAG_MPS, LEAST_SHARED = 0.5, 3
+"""Speeds on the way down and up that differ by more, in so many bins at least, come from a probe that lags behind."""
+
 NORMAL = 1.4826
 """The standard deviation of normal errors, in medians of their sizes."""
 
@@ -75,6 +81,12 @@ class MeasuredCast:
         How far single speeds lie from those of their bins, as a standard deviation.
     samples
         How many speeds it is made of.
+    bins
+        For each entry of the profile how many speeds its bin has, and how far they lie from their median as a standard
+        deviation, metres per second.
+    lag_mps
+        By how much speeds on the way down are larger than on the way up, median over bins that have both; None: too few
+        have. Where that is much, only the way down counts, on which a probe meets water that nothing has stirred.
     """
 
     time_s: float
@@ -83,6 +95,13 @@ class MeasuredCast:
     profile: list[tuple[float, float]]
     sd_mps: float
     samples: int
+    bins: list[tuple[int, float]]
+    lag_mps: float | None = None
+
+
+def is_possible(speed_mps: float) -> bool:
+    """Tell whether sound in water can be so fast."""
+    return SLOWEST_MPS <= speed_mps <= FASTEST_MPS
 
 
 def measured_casts(samples: SoundSpeedSamples) -> list[MeasuredCast]:
@@ -129,17 +148,53 @@ def _parts(samples: SoundSpeedSamples) -> list[slice]:
 
 
 def _cast(samples: SoundSpeedSamples) -> MeasuredCast | None:
-    """Return the cast of some samples; None where they cover too little of the water."""
+    """Return the cast of some samples in the order of their times; None where they cover too little of the water."""
+    way = _way(samples)
+    width_m = max(BIN_M, float(samples.depth_m.max()) / MOST_BINS)
+    lag_mps = _lag_mps(samples.take(way > 0), samples.take(way < 0), width_m)
+    found = None
+    if lag_mps is not None and abs(lag_mps) > LAG_MPS:
+        found = _profile(samples.take(way >= 0), width_m, lag_mps)
+    return found or _profile(samples, width_m, lag_mps)
+
+
+def _way(samples: SoundSpeedSamples) -> FloatArray:
+    """Return 1 for each sample that was measured on the way down, -1 for one on the way up, 0 for neither."""
+    if len(samples) < 2:
+        return np.zeros(len(samples))
+    padded = np.concatenate([samples.depth_m[:1], samples.depth_m, samples.depth_m[-1:]])
+    gone_m = padded[2:] - padded[:-2]
+    return np.where(np.abs(gone_m) < 2.0 * LEVEL_M, 0.0, np.sign(gone_m))
+
+
+def _lag_mps(down: SoundSpeedSamples, up: SoundSpeedSamples, width_m: float) -> float | None:
+    """Return by how much speeds on the way down are larger than on the way up; None where too few bins have both."""
+    on_way_down, on_way_up = _binned(down, width_m), _binned(up, width_m)
+    off = [
+        float(np.median(down.speed_mps[own]) - np.median(up.speed_mps[on_way_up[one]]))
+        for one, own in on_way_down.items()
+        if one in on_way_up
+    ]
+    return float(np.median(off)) if len(off) >= LEAST_SHARED else None
+
+
+def _binned(samples: SoundSpeedSamples, width_m: float) -> dict[int, BoolArray]:
+    """Return which samples are in each bin of depth, by its number; bins of too few are left out."""
+    number = np.floor(samples.depth_m / width_m).astype(np.int64)
+    bins = {int(one): number == one for one in np.unique(number)}
+    return {one: own for one, own in bins.items() if own.sum() >= LEAST_SAMPLES}
+
+
+def _profile(samples: SoundSpeedSamples, width_m: float, lag_mps: float | None) -> MeasuredCast | None:
+    """Return the cast of samples, all of which count; None where they cover too little of the water."""
     depth_m, speed = samples.depth_m, samples.speed_mps
-    width_m = max(BIN_M, float(depth_m.max()) / MOST_BINS)
-    number = np.floor(depth_m / width_m).astype(np.int64)
-    profile, off = [], []
-    for one in np.unique(number):
-        own = number == one
-        if own.sum() >= LEAST_SAMPLES:
-            median = float(np.median(speed[own]))
-            profile.append((round(float(depth_m[own].mean()), 2), round(median, 2)))
-            off.append(np.abs(speed[own] - median))
+    profile, bins, off = [], [], []
+    for own in _binned(samples, width_m).values():
+        median = float(np.median(speed[own]))
+        away = np.abs(speed[own] - median)
+        profile.append((round(float(depth_m[own].mean()), 2), round(median, 2)))
+        bins.append((int(own.sum()), round(NORMAL * float(np.median(away)), 3)))
+        off.append(away)
     if len(profile) < 2 or profile[-1][0] - profile[0][0] < LEAST_SPAN_M - BIN_M:
         return None
     return MeasuredCast(
@@ -149,4 +204,6 @@ def _cast(samples: SoundSpeedSamples) -> MeasuredCast | None:
         profile=profile,
         sd_mps=round(NORMAL * float(np.median(np.concatenate(off))), 3),
         samples=len(samples),
+        bins=bins,
+        lag_mps=None if lag_mps is None else round(lag_mps, 3),
     )

@@ -148,6 +148,17 @@ class RangeReport:
 
 
 @dataclass(frozen=True, slots=True)
+class SoundSpeedReport:
+    """How fast sound was where a vehicle was; ``source`` is the probe that measured it."""
+
+    vehicle: str
+    time_s: float
+    position: Position
+    speed_mps: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
 class ScanReport:
     """A look round: ranges along bearings, clockwise from true north, the first one and so much more for each.
 
@@ -274,6 +285,7 @@ FleetEvent = (
     VehicleReport
     | SoundingReport
     | RangeReport
+    | SoundSpeedReport
     | ScanReport
     | PingReport
     | WaypointReport

@@ -22,6 +22,7 @@ from app.missions.live.flight_status import FlightStatus
 from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
 from app.missions.live.journals.range_journal import RangeJournal
+from app.missions.live.journals.sound_speed_journal import SoundSpeedJournal
 from app.missions.live.journals.swath_intake import SwathIntake
 from app.missions.live.mission_map import MissionMap
 from app.missions.live.placed_files import PlacedFiles
@@ -135,6 +136,8 @@ class LiveMission:
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, TargetFilters(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
+        self.sound_speeds = SoundSpeedJournal(database, row.id, self.journal.storage, time_scale)
+        """What vehicles measure of the water."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
         self._fitted_budget = spec.budget
@@ -158,6 +161,7 @@ class LiveMission:
             self.header,
             self.journal,
             self.ranges,
+            self.sound_speeds,
             self.boundaries,
             self.waypoints,
             self.changed,
@@ -475,6 +479,7 @@ class LiveMission:
         """Write nothing any more, and let everyone who watches ask again."""
         self.feed.stop()
         self.ranges.abandon()
+        self.sound_speeds.abandon()
         self.journal.abandon()
         self.pings.abandon()
         self.broadcaster.end(why)
@@ -483,6 +488,7 @@ class LiveMission:
         """Write what is left; ``until_s``: as for ``PingStore.close``."""
         await self.feed.close()
         await self.ranges.close()
+        await self.sound_speeds.close()
         await self.journal.close()
         await self.pings.close(until_s)
         await self.stored_soundings.close(self.header.step)

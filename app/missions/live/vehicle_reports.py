@@ -17,6 +17,7 @@ from app.missions.fleet.interface import (
     RestartReport,
     ScanReport,
     SoundingReport,
+    SoundSpeedReport,
     VehicleReport,
     WaypointReport,
     WaypointStatus,
@@ -26,6 +27,7 @@ from app.missions.live.boundaries import Boundaries
 from app.missions.live.header import MissionHeader
 from app.missions.live.journals.journal import Journal
 from app.missions.live.journals.range_journal import RangeJournal
+from app.missions.live.journals.sound_speed_journal import SoundSpeedJournal
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.live.watchers.waypoints import WaypointViews
 from app.missions.spec.failsafes import Response
@@ -60,6 +62,7 @@ class VehicleReports:
         header: MissionHeader,
         journal: Journal,
         ranges: RangeJournal,
+        sound_speeds: SoundSpeedJournal,
         boundaries: Boundaries,
         waypoints: WaypointViews,
         changed: asyncio.Event,
@@ -71,6 +74,7 @@ class VehicleReports:
         self._header = header
         self._journal = journal
         self._ranges = ranges
+        self._sound_speeds = sound_speeds
         self._boundaries = boundaries
         self._waypoints = waypoints
         self._changed = changed
@@ -117,6 +121,9 @@ class VehicleReports:
                 return
             case RangeReport():
                 self._ranges.note(event, member.report.time_s if member.report else None)
+                return
+            case SoundSpeedReport():
+                self._sound_speeds.note(event)
                 return
             case LinkReport():
                 member.note_link(event.state)

@@ -15,7 +15,15 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.fleet.interface import BeamGeometry, PingReport, Position, RangeReport, SoundingReport, VehicleReport
+from app.missions.fleet.interface import (
+    BeamGeometry,
+    PingReport,
+    Position,
+    RangeReport,
+    SoundingReport,
+    SoundSpeedReport,
+    VehicleReport,
+)
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
 from app.missions.pings.store import BEAMS_PER_ITEM, JudgedBatch
@@ -79,8 +87,10 @@ def _looked_through(
     live: LiveMission, items: Sequence[Measurement]
 ) -> tuple[str, dict[int, str], dict[int, SoundingReport], "_Pings"]:
     """Return what a batch is known by, and by item why it is refused, its sounding, and its pings; changes nothing."""
-    # Batches without beams are known by what they were known by before there were any.
-    dumped = [item.model_dump(exclude={"beams"} if item.beams is None else None) for item in items]
+    # Batches without what came later to measurements are known by what they were known by before.
+    dumped = [
+        item.model_dump(exclude={n for n in ("beams", "sound_speed_mps") if getattr(item, n) is None}) for item in items
+    ]
     digest = hashlib.sha256(orjson.dumps(dumped)).hexdigest()
     near = _all_near(items, live.frame)
     refusals = {i: _refusal(live, item, near=near) for i, item in enumerate(items)}
@@ -169,6 +179,7 @@ class _Intake:
                     await _hear(live, batch, doubts.get(i, {}), only_unknown=result.replayed)
             # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
             await live.journal.flush()
+            await live.sound_speeds.flush()
         except Exception as error:
             # The batches are stored: each sender hears of it and asks again; done alone they would be duplicates.
             return [error for _ in batches]
@@ -298,6 +309,15 @@ async def _hear(live: LiveMission, batch: _Batch, doubts: Mapping[int, str], *, 
     fresh = [item for i, item in batch.known.items() if item.vehicle in links and i not in doubts]
     reports = await made_of(fresh, _vehicle_reports, fresh)
     await each_of(reports, lambda report: links[report.vehicle].heard(report))
+    if not only_unknown:
+        await each_of(fresh, partial(_note_sound_speed, live))
+
+
+def _note_sound_speed(live: LiveMission, item: Measurement) -> None:
+    if item.sound_speed_mps is not None:
+        place = Position(item.lat_deg, item.lon_deg, item.depth_m)
+        report = SoundSpeedReport(item.vehicle, item.time_s, place, item.sound_speed_mps, "rest")
+        live.sound_speeds.note(report, posted=True)
 
 
 def _names(batch: _Batch) -> set[str]:

@@ -77,6 +77,11 @@ class Measurement(BaseModel):
         default=None, min_length=1, max_length=64, description="The moving target that target_range_m was measured to"
     )
     target_range_m: float | None = Field(default=None, description="Range from the vehicle to that target, metres")
+    sound_speed_mps: float | None = Field(
+        default=None,
+        description="Speed of sound in the water about the vehicle, by its probe, m/s: what it measures becomes casts "
+        "that can be added. Ignored where no water has it (below 1350 or above 1650)",
+    )
     heading_deg: float | None = None
     speed_mps: float | None = Field(default=None, ge=0)
     battery_pct: float | None = Field(default=None, ge=0, le=100)

@@ -13,6 +13,7 @@ from app.storage.models.measurements import (
     PositionRow,
     ScanRow,
     SoundingRow,
+    SoundSpeedRow,
     TargetRangeRow,
     TelemetryRow,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "SiteMissionRow",
     "SiteRow",
     "SiteSurveyRow",
+    "SoundSpeedRow",
     "SoundingRow",
     "StepRow",
     "StoredMapRow",

@@ -177,6 +177,24 @@ class PositionRow(Base):
     log: Mapped[int | None] = mapped_column(BigId)
 
 
+class SoundSpeedRow(Base):
+    """How fast sound was where a vehicle was, thinned; ``time_s`` by the vehicle's clock."""
+
+    __tablename__ = "sound_speeds"
+    __table_args__ = (Index("ix_sound_speeds_mission", "mission_id", "vehicle", "id"),)
+
+    id: Mapped[int] = mapped_column(BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    source: Mapped[str] = mapped_column(String(64))
+    """The probe."""
+    time_s: Mapped[float]
+    lat_deg: Mapped[float]
+    lon_deg: Mapped[float]
+    depth_m: Mapped[float]
+    speed_mps: Mapped[float]
+
+
 class TelemetryRow(Base):
     """A vehicle's telemetry at a moment, thinned; all vehicles of a mission have the same moments.
 

@@ -117,7 +117,7 @@ async def test_the_casts_in_a_log_are_offered_and_count_when_they_are_added(
     assert log["state"] == "done", log
     (cast,) = (await client.get(f"{path}/sound-speed/measured")).json()
     assert (cast["vehicle"], cast["file"]) == (writer.NAME, "Dive.lsf")
-    assert log["result"]["casts"] == [{name: cast[name] for name in cast if name not in ("vehicle", "file")}]
+    assert log["result"]["casts"] == [{name: cast[name] for name in cast if name not in ("vehicle", "file", "probe")}]
     depths, speeds = zip(*cast["profile"], strict=True)
     assert depths[0] < 1.0
     assert depths[-1] > 11.0

@@ -34,6 +34,26 @@ def of(samples: SoundSpeedSamples) -> MeasuredCast:
     return cast
 
 
+def test_of_a_probe_that_lags_behind_only_the_way_down_counts() -> None:
+    depths = np.concatenate([np.linspace(0.5, 20.0, 300), np.linspace(20.0, 0.5, 300)])
+    dived = dive(1e9, depths)
+    lagging = SoundSpeedSamples(
+        dived.time_s,
+        depths,
+        np.where(np.arange(600) < 300, dived.speed_mps, dived.speed_mps + 3.0),
+        dived.lat_deg,
+        dived.lon_deg,
+    )
+    cast = of(lagging)
+    assert cast.lag_mps == pytest.approx(-3.0, abs=0.1)
+    assert cast.samples == pytest.approx(300, abs=2)
+    inner = [(depth, speed) for depth, speed in cast.profile if abs(depth - 8.0) > 0.6]
+    assert [speed for _, speed in inner] == pytest.approx([float(speed_mps(np.array(d))) for d, _ in inner], abs=0.1)
+    steady = of(dived)
+    assert steady.samples == 600, "a probe that does not lag counts both ways"
+    assert sum(count for count, _ in steady.bins) == pytest.approx(600, abs=2)
+
+
 def test_a_dive_tells_the_water_that_it_went_through() -> None:
     rng = np.random.default_rng(4)
     cast = of(dive(1e9, DOWN_AND_UP, rng))

@@ -31,6 +31,7 @@ from app.storage.models import (
     SiteRow,
     SiteSurveyRow,
     SoundingRow,
+    SoundSpeedRow,
     StepRow,
     StoredMapRow,
     TargetRangeRow,
@@ -198,6 +199,20 @@ def ping_block(mission_id: str = "m1", **changes: Any) -> dict[str, Any]:
     return values | changes
 
 
+def sound_speed(mission_id: str = "m1", time_s: float = 1.0, **changes: Any) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "mission_id": mission_id,
+        "vehicle": "a",
+        "source": "CTD",
+        "time_s": time_s,
+        "lat_deg": 41.18,
+        "lon_deg": -8.7,
+        "depth_m": 2.0,
+        "speed_mps": 1507.5,
+    }
+    return values | changes
+
+
 def ping_chunk(mission_id: str = "m1") -> PingChunkRow:
     """What the database knows of the file :data:`PING_FILE`."""
     return PingChunkRow(
@@ -260,6 +275,7 @@ def one_of_each() -> list[list[Any]]:
             ),
             BeamEditRow(mission_id="m1", made_at=TIME, actor="me", ruling="rejected", note="fish", content=b"beams"),
             TargetRangeRow(**target_range()),
+            SoundSpeedRow(**sound_speed()),
             ScanRow(**scan()),
             VehicleOrderRow(
                 mission_id="m1",

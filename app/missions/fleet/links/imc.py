@@ -22,6 +22,7 @@ from app.missions.fleet.interface import (
     RangeReport,
     RestartReport,
     SoundingReport,
+    SoundSpeedReport,
     StopReceipt,
     VehicleInfo,
     VehicleRefusedError,
@@ -45,6 +46,7 @@ from imc_bridge import (
     RefusedError,
     Restarted,
     Sounding,
+    SoundSpeedSample,
     StateReport,
     SwathPing,
     TargetRange,
@@ -245,6 +247,8 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             return ping_report(event)
         case TargetRange():
             return range_report(event)
+        case SoundSpeedSample():
+            return sound_speed_report(event)
         case WaypointChange():
             return WaypointReport(
                 vehicle=event.vehicle,
@@ -331,6 +335,17 @@ def range_report(event: TargetRange) -> RangeReport:
         position=Position(event.vehicle_lat_deg, event.vehicle_lon_deg, event.vehicle_depth_m),
         source=event.source,
         position_sd_m=event.position_sd_m,
+    )
+
+
+def sound_speed_report(event: SoundSpeedSample) -> SoundSpeedReport:
+    """A sound speed that the bridge heard of, as missions know it."""
+    return SoundSpeedReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        position=Position(event.lat_deg, event.lon_deg, event.depth_m),
+        speed_mps=event.speed_mps,
+        source=event.source,
     )
 
 

@@ -1,23 +1,74 @@
-"""Sound speed casts that vehicles measured on their way, as their logs tell."""
+"""Sound speed casts that vehicles measured on their way, as they sent them and as their logs tell."""
 
+from collections import defaultdict
+from collections.abc import Sequence
 from datetime import datetime
+from typing import Any
 
+import numpy as np
+
+from app.mapping.water.measured_casts import MeasuredCast, SoundSpeedSamples, measured_casts
+from app.missions.large_batches import made_of
 from app.missions.live.mission import LiveMission
 from app.missions.views.measurements.corrections import VehicleCastView
+from app.missions.views.measurements.measured_casts import shown_casts
 from app.storage.queries import events as event_queries
+from app.storage.queries import sound_speeds as sound_speed_queries
 
 
-async def vehicles_casts(live: LiveMission) -> list[VehicleCastView]:
-    """Return the casts in all logs that were imported and not taken back, in the order of their times."""
+async def vehicles_casts(
+    live: LiveMission,
+    *,
+    vehicle: str | None = None,
+    since: datetime | None = None,
+    until: datetime | None = None,
+) -> list[VehicleCastView]:
+    """Return the casts that vehicles measured, in the order of their times.
+
+    What a vehicle sent is left out where its log, which has more of it, was imported and not taken back.
+
+    Parameters
+    ----------
+    vehicle
+        Whose; None: of all.
+    since, until
+        Casts are made of what was measured between these times, by the vehicle's clock; those of logs are made already,
+        and are returned where they lie between.
+    """
     await live.journal.flush()
+    await live.sound_speeds.flush()
+    first_s, last_s = (None if moment is None else moment.timestamp() for moment in (since, until))
     async with live.database.reading() as session:
-        rows = await event_queries.events_of_kind(session, live.id, "import")
+        events = await event_queries.events_of_kind(session, live.id, "import")
+        rows = await sound_speed_queries.samples(session, live.id, vehicle=vehicle, first_s=first_s, last_s=last_s)
+    logs = [row.data for row in events if row.data.get("casts") and row.data.get("log") not in live.pings.taken_back]
     found: dict[tuple[str, datetime], VehicleCastView] = {}
-    for row in rows:
-        if row.data.get("log") in live.pings.taken_back:
-            continue
-        for cast in row.data.get("casts") or []:
-            view = VehicleCastView(vehicle=row.data["vehicle"], file=row.data["file"], **cast)
-            # A log that was sent again tells the same.
+    for log in logs:
+        for cast in log["casts"]:
+            view = VehicleCastView(vehicle=log["vehicle"], file=log["file"], **cast)
+            is_wanted = (vehicle or view.vehicle) == view.vehicle
+            if is_wanted and (since is None or view.time >= since) and (until is None or view.time <= until):
+                # A log that was sent again tells the same.
+                found[view.vehicle, view.time] = view
+    for view in await made_of(rows, _sent_casts, rows):
+        if not any(log["vehicle"] == view.vehicle and _covers(log, view.time) for log in logs):
             found[view.vehicle, view.time] = view
     return sorted(found.values(), key=lambda view: view.time)
+
+
+def _sent_casts(rows: Sequence[Any]) -> list[VehicleCastView]:
+    """Return the casts in what vehicles sent, of each the probe that measured most."""
+    probes: dict[str, dict[str, list[tuple[float, ...]]]] = defaultdict(lambda: defaultdict(list))
+    for name, probe, *values in rows:
+        probes[name][probe].append(tuple(values))
+    found = []
+    for name, by_probe in probes.items():
+        probe = max(by_probe, key=lambda one: len(by_probe[one]))
+        casts: list[MeasuredCast] = measured_casts(SoundSpeedSamples(*np.array(by_probe[probe], dtype=float).T))
+        found += [VehicleCastView(vehicle=name, probe=probe, **cast.model_dump()) for cast in shown_casts(casts)]
+    return found
+
+
+def _covers(log: dict[str, Any], moment: datetime) -> bool:
+    first_s, last_s = log.get("first_s"), log.get("last_s")
+    return first_s is not None and last_s is not None and first_s <= moment.timestamp() <= last_s

@@ -6,14 +6,12 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
 from pydantic import TypeAdapter, ValidationError
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.mapping.water.measured_casts import MeasuredCast
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import PingReport, SoundingReport, VehicleReport
@@ -25,7 +23,8 @@ from app.missions.operations.imports.log_batches import LogBatch, LogBatches, Lo
 from app.missions.operations.imports.multibeam_log import is_multibeam
 from app.missions.settings import ServiceSettings
 from app.missions.spec.base import Name
-from app.missions.views.measurements.soundings import LogImportView, MeasuredCastView, Verdict
+from app.missions.views.measurements.measured_casts import shown_casts
+from app.missions.views.measurements.soundings import LogImportView, Verdict
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.models import BatchRow, LogRow
@@ -379,7 +378,7 @@ class LogImport:
             skipped_bytes=facts.skipped_bytes,
             cut_off=facts.cut_off,
             notes=facts.notes,
-            casts=_shown(facts.casts),
+            casts=shown_casts(facts.casts),
             known=tally.was_known and tally.known > 0,
         )
 
@@ -426,22 +425,3 @@ def _digest(path: Path) -> str:
 def _general(reason: str) -> str:
     """Return a reason without its figures, so that equal ones can be counted."""
     return re.sub(r"-?\d+(\.\d+)?", "…", reason)
-
-
-def _shown(casts: Sequence[MeasuredCast]) -> list[MeasuredCastView]:
-    """Return casts as they are shown, without those that cannot be: a log is what nobody vouches for."""
-    found = []
-    for cast in casts:
-        try:
-            found.append(
-                MeasuredCastView(
-                    time=datetime.fromtimestamp(cast.time_s, UTC),
-                    position=(cast.lon_deg, cast.lat_deg),
-                    profile=cast.profile,
-                    sd_mps=cast.sd_mps,
-                    samples=cast.samples,
-                )
-            )
-        except (ValidationError, ValueError, OverflowError, OSError):
-            continue
-    return found

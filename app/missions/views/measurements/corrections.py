@@ -79,10 +79,11 @@ class CastView(View):
 
 
 class VehicleCastView(MeasuredCastView):
-    """A sound speed cast in a vehicle's log."""
+    """A sound speed cast that a vehicle measured, as it sent it or as its log has it."""
 
     vehicle: str
-    file: str = Field(description="The log's name")
+    file: str | None = Field(default=None, description="The log's name; null: it was sent")
+    probe: str | None = Field(default=None, description="What measured it; null: a log does not keep that")
 
 
 class CastChangeView(View):

@@ -130,6 +130,16 @@ class MeasuredCastView(View):
     )
     sd_mps: float = Field(description="How far single speeds lie from those of their bins, as a standard deviation")
     samples: int = Field(description="Speeds that it is made of")
+    bins: list[tuple[int, float]] = Field(
+        default=[],
+        description="For each entry of the profile [speeds in its bin, how far they lie from their median as a "
+        "standard deviation in m/s]; empty: of a log that was read by an earlier version",
+    )
+    lag_mps: float | None = Field(
+        default=None,
+        description="By how much speeds on the way down are larger than on the way up, m/s; from 0.5 on, either way, "
+        "only the way down counts. Null: too little was measured on both",
+    )
 
 
 class LogImportView(View):

@@ -1290,6 +1290,14 @@ class MeasuredCastView(Model):
     """How far single speeds lie from those of their bins, as a standard deviation"""
     samples: int
     """Speeds that it is made of"""
+    bins: list[tuple[int, float]]
+    """For each entry of the profile [speeds in its bin, how far they lie from their median as a standard deviation
+    in m/s]; empty: of a log that was read by an earlier version
+    """
+    lag_mps: float | None
+    """By how much speeds on the way down are larger than on the way up, m/s; from 0.5 on, either way, only the way
+    down counts. Null: too little was measured on both
+    """
 
 
 class Measurement(Model):
@@ -1327,6 +1335,10 @@ class Measurement(Model):
     """The moving target that target_range_m was measured to"""
     target_range_m: float | None = None
     """Range from the vehicle to that target, metres"""
+    sound_speed_mps: float | None = None
+    """Speed of sound in the water about the vehicle, by its probe, m/s: what it measures becomes casts that can be
+    added. Ignored where no water has it (below 1350 or above 1650)
+    """
     heading_deg: float | None = None
     speed_mps: float | None = None
     battery_pct: float | None = None
@@ -2977,7 +2989,7 @@ class UncertaintyBudgetView(Model):
 
 
 class VehicleCastView(Model):
-    """A sound speed cast in a vehicle's log."""
+    """A sound speed cast that a vehicle measured, as it sent it or as its log has it."""
 
     time: datetime
     """The middle of the time in which it was measured, by the vehicle's clock"""
@@ -2989,9 +3001,19 @@ class VehicleCastView(Model):
     """How far single speeds lie from those of their bins, as a standard deviation"""
     samples: int
     """Speeds that it is made of"""
+    bins: list[tuple[int, float]]
+    """For each entry of the profile [speeds in its bin, how far they lie from their median as a standard deviation
+    in m/s]; empty: of a log that was read by an earlier version
+    """
+    lag_mps: float | None
+    """By how much speeds on the way down are larger than on the way up, m/s; from 0.5 on, either way, only the way
+    down counts. Null: too little was measured on both
+    """
     vehicle: str
-    file: str
-    """The log's name"""
+    file: str | None
+    """The log's name; null: it was sent"""
+    probe: str | None
+    """What measured it; null: a log does not keep that"""
 
 
 class VehicleDiagnosis(Model):

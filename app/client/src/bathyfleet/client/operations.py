@@ -513,12 +513,30 @@ class Operations(ABC):
             body=body,
         ))
 
-    def get_measured_casts(self, mission_id: str) -> list[models.VehicleCastView]:
-        """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``."""
+    def get_measured_casts(
+        self,
+        mission_id: str,
+        *,
+        vehicle: str | None = None,
+        since: datetime | None = None,
+        until: datetime | None = None,
+    ) -> list[models.VehicleCastView]:
+        """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``.
+
+        Parameters
+        ----------
+        vehicle : str
+            Whose; default: of all
+        since : datetime
+            Of what was measured from then on
+        until : datetime
+            Of what was measured until then
+        """
         return self._call(Call[list[models.VehicleCastView]](
             "GET",
             f"/missions/{part(mission_id)}/sound-speed/measured",
             list[models.VehicleCastView],
+            query={"vehicle": vehicle, "since": since, "until": until},
         ))
 
     def set_cast(
@@ -2231,12 +2249,30 @@ class AsyncOperations(ABC):
             body=body,
         ))
 
-    async def get_measured_casts(self, mission_id: str) -> list[models.VehicleCastView]:
-        """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``."""
+    async def get_measured_casts(
+        self,
+        mission_id: str,
+        *,
+        vehicle: str | None = None,
+        since: datetime | None = None,
+        until: datetime | None = None,
+    ) -> list[models.VehicleCastView]:
+        """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``.
+
+        Parameters
+        ----------
+        vehicle : str
+            Whose; default: of all
+        since : datetime
+            Of what was measured from then on
+        until : datetime
+            Of what was measured until then
+        """
         return await self._call(Call[list[models.VehicleCastView]](
             "GET",
             f"/missions/{part(mission_id)}/sound-speed/measured",
             list[models.VehicleCastView],
+            query={"vehicle": vehicle, "since": since, "until": until},
         ))
 
     async def set_cast(

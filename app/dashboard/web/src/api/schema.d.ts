@@ -790,7 +790,9 @@ export interface paths {
         };
         /**
          * See the sound speed casts that vehicles measured
-         * @description Return the casts in vehicles' logs that were imported, oldest first. None counts before it is added.
+         * @description Return the casts that vehicles measured, as they sent them and in logs that were imported, oldest first.
+         *
+         *     None counts before it is added. Where a log was imported, it stands for what its vehicle sent meanwhile.
          */
         get: operations["getMeasuredCasts"];
         put?: never;
@@ -4854,6 +4856,20 @@ export interface components {
              * @description Speeds that it is made of
              */
             samples: number;
+            /**
+             * Bins
+             * @description For each entry of the profile [speeds in its bin, how far they lie from their median as a standard deviation in m/s]; empty: of a log that was read by an earlier version
+             * @default []
+             */
+            bins: [
+                number,
+                number
+            ][];
+            /**
+             * Lag Mps
+             * @description By how much speeds on the way down are larger than on the way up, m/s; from 0.5 on, either way, only the way down counts. Null: too little was measured on both
+             */
+            lag_mps: number | null;
         };
         /**
          * Measurement
@@ -4932,6 +4948,11 @@ export interface components {
              * @description Range from the vehicle to that target, metres
              */
             target_range_m?: number | null;
+            /**
+             * Sound Speed Mps
+             * @description Speed of sound in the water about the vehicle, by its probe, m/s: what it measures becomes casts that can be added. Ignored where no water has it (below 1350 or above 1650)
+             */
+            sound_speed_mps?: number | null;
             /** Heading Deg */
             heading_deg?: number | null;
             /** Speed Mps */
@@ -8757,7 +8778,7 @@ export interface components {
         };
         /**
          * VehicleCastView
-         * @description A sound speed cast in a vehicle's log.
+         * @description A sound speed cast that a vehicle measured, as it sent it or as its log has it.
          */
         VehicleCastView: {
             /**
@@ -8792,13 +8813,32 @@ export interface components {
              * @description Speeds that it is made of
              */
             samples: number;
+            /**
+             * Bins
+             * @description For each entry of the profile [speeds in its bin, how far they lie from their median as a standard deviation in m/s]; empty: of a log that was read by an earlier version
+             * @default []
+             */
+            bins: [
+                number,
+                number
+            ][];
+            /**
+             * Lag Mps
+             * @description By how much speeds on the way down are larger than on the way up, m/s; from 0.5 on, either way, only the way down counts. Null: too little was measured on both
+             */
+            lag_mps: number | null;
             /** Vehicle */
             vehicle: string;
             /**
              * File
-             * @description The log's name
+             * @description The log's name; null: it was sent
              */
-            file: string;
+            file: string | null;
+            /**
+             * Probe
+             * @description What measured it; null: a log does not keep that
+             */
+            probe: string | null;
         };
         /**
          * VehicleDiagnosis
@@ -13595,7 +13635,14 @@ export interface operations {
     };
     getMeasuredCasts: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Whose; default: of all */
+                vehicle?: string;
+                /** @description Of what was measured from then on */
+                since?: string;
+                /** @description Of what was measured until then */
+                until?: string;
+            };
             header?: never;
             path: {
                 /** @description The mission's id */
