@@ -7,13 +7,24 @@ from functools import partial
 import imcpy
 import pytest
 
-from imc_bridge import Bridge, Guidance, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
+from imc_bridge import (
+    Bridge,
+    Guidance,
+    LinkChange,
+    NodeState,
+    RefusedError,
+    Sounding,
+    SoundSpeedSample,
+    WaypointChange,
+    WaypointStatus,
+)
 from imc_bridge.control.controls import Controls
 from imc_bridge.control.plans import OPERATION_START, plan_control
 from imc_bridge.control.rates import DUNE_DEFAULTS
 from imc_bridge.network.codec import encode
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.node import Node
+from simulator.dune.entities import SIMULATION
 from tests.support.imc.sea import Peer, Sea, open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until
@@ -60,6 +71,34 @@ async def test_two_vehicles_follow_three_waypoints_and_stop(loss: float, sensor:
     sources = {sounding.source for sounding in sea.of(Sounding)}
     assert sources == ({"Altimeter"} if sensor == "single" else {f"DVL Beam {k}" for k in range(4)})
     assert all(sounding.position_sd_m is not None for sounding in sea.of(Sounding)[-20:])
+
+
+async def test_what_a_probe_on_board_tells_of_the_water_is_heard_with_its_place() -> None:
+    async with open_sea() as sea:
+        (name,) = await sea.ready()
+        (node,) = sea.fleet.nodes
+        await until(lambda: bool(sea.bridge.nodes()[0].entities), "its entities have names")
+
+        def told(count: int) -> bool:
+            return len(sea.of(SoundSpeedSample)) == count
+
+        def later(time_s: float) -> bool:
+            return node.vehicle.time_s > time_s
+
+        for count, value in enumerate((1507.5, 343.0, 1508.5)):
+            await until(partial(told, min(count, 1)), "what can be is told")
+            message = imcpy.SoundSpeed()
+            message.value = value
+            sent_s = node.vehicle.time_s
+            node.send(message, SIMULATION["CTD"])
+            await until(partial(later, sent_s), "each has a time of its own")
+        await until(partial(told, 2), "both are told")
+    for one in sea.of(SoundSpeedSample):
+        assert (one.vehicle, one.source) == (name, "CTD")
+        east, north = sea.floor.frame.to_local(one.lat_deg, one.lon_deg)
+        assert sea.floor.contains(east, north)
+        assert 0.0 <= one.depth_m < 1.0, "it floats"
+    assert [one.speed_mps for one in sea.of(SoundSpeedSample)] == [1507.5, 1508.5]
 
 
 async def test_repeated_order_is_harmless_and_a_new_one_replaces_the_old() -> None:
