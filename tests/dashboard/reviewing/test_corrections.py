@@ -12,7 +12,7 @@ from tests.support.dashboard.steps import by_id, picture, show, violations
 from tests.support.imc import log_writer
 from tests.support.mapping.calibration import REAL, calibration
 from tests.support.mapping.tracks import flown, lawnmower, measured
-from tests.support.missions.specs import rectangle
+from tests.support.missions.specs import LAT, LON, rectangle
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -190,6 +190,45 @@ def test_a_cast_that_a_vehicle_measured_is_filled_in_and_added(
     told = service.get(f"/missions/{surveyed}/corrections")["sound_speed"]
     assert (told["source"], len(told["profile"]) > 15) == ("Dive.lsf", True)
     assert [one for one in violations(page) if "-rover" not in one] == []
+
+
+def test_a_cast_that_a_vehicle_sent_is_shown_as_a_profile_and_added(
+    watched: Watched, service: Service, surveyed: str
+) -> None:
+    page = watched.page
+    dive = [
+        {
+            "vehicle": "rover",
+            "time_s": START_S + 900.0 + second,
+            "lat_deg": LAT,
+            "lon_deg": LON,
+            "depth_m": 15.0 * (1.0 - abs(2.0 * second / 400 - 1.0)),
+        }
+        for second in range(400)
+    ]
+    for item in dive:
+        depth_m = float(str(item["depth_m"]))
+        item["sound_speed_mps"] = 1520.0 - 0.3 * depth_m - (15.0 if depth_m > 6.0 else 0.0)
+    service.post(f"/missions/{surveyed}/measurements", {"items": dive})
+    show(page, surveyed)
+    by_id(page, "toggle-corrections").click()
+    sent = by_id(page, "measured-cast")
+    expect(sent).to_contain_text("sent by the vehicle")
+    sent.locator("summary").click()
+    expect(by_id(page, "cast-chart")).to_be_visible()
+    by_id(page, "cast-chart").scroll_into_view_if_needed()
+    picture(page, "cast-sent")
+    assert [one for one in violations(page) if "-rover" not in one] == []
+    page.set_viewport_size({"width": 390, "height": 844})
+    by_id(page, "toggle-missions").click()
+    by_id(page, "cast-chart").scroll_into_view_if_needed()
+    picture(page, "cast-sent-narrow")
+    sent.get_by_role("button", name="Fill in").click()
+    assert service.get(f"/missions/{surveyed}/corrections")["sound_speed"] is None, "it is not applied yet"
+    expect(by_id(page, "cast-time")).to_have_value(re.compile(r"^2026-11-21 0\d:\d\d"))
+    by_id(page, "cast-add").click()
+    expect(by_id(page, "cast")).to_have_count(1)
+    assert service.get(f"/missions/{surveyed}/corrections")["sound_speed"]["source"] == "rover rest"
 
 
 def test_casts_are_added_from_files_changed_and_removed(watched: Watched, service: Service, surveyed: str) -> None:

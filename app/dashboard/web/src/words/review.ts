@@ -102,6 +102,24 @@ export const REVIEW = {
     en: "{samples} speeds, ± {sd} m/s",
     pt: "{samples} velocidades, ± {sd} m/s",
   },
+  "casts.profile": { en: "Profile", pt: "Perfil" },
+  "casts.chart": {
+    en: "Sound speed over depth, measured by {vehicle}",
+    pt: "Velocidade do som em profundidade, medida por {vehicle}",
+  },
+  "casts.axes": {
+    en: "speed of sound, m/s, over depth, m",
+    pt: "velocidade do som, m/s, em profundidade, m",
+  },
+  "casts.bin": {
+    en: "{depth}: {speed} ± {sd} m/s of {samples} speeds",
+    pt: "{depth}: {speed} ± {sd} m/s de {samples} velocidades",
+  },
+  "casts.lags": {
+    en: "down and up differ by {lag} m/s: only the way down",
+    pt: "descida e subida diferem {lag} m/s: só a descida",
+  },
+  "casts.sent": { en: "sent by the vehicle", pt: "enviado pelo veículo" },
   "casts.change": { en: "Change…", pt: "Alterar…" },
   "casts.remove": { en: "Remove", pt: "Remover" },
   "casts.name": { en: "Name of the cast", pt: "Nome do perfil" },

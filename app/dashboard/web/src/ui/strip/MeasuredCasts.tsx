@@ -7,9 +7,16 @@ import { said } from "../../state/session";
 import { selectedId, view } from "../../state/store";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
+import { CastChart } from "./CastChart";
 import type { Shown } from "./Casts";
 
-/** What vehicles measured of the sound's speed on their way, as their logs tell; filled in, it can be added as a cast. */
+/** What vehicles send is looked at again after this time; logs are when they were imported. */
+const AGAIN_MS = 60_000;
+
+/** From this difference on the service takes only the way down, m/s. */
+const LAGS_MPS = 0.5;
+
+/** What vehicles measured of the sound's speed on their way; filled in, it can be added as a cast. */
 export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<string> }) {
   const found = useSignal<readonly VehicleCastView[]>([]);
   // Logs are imported, and taken back, meanwhile.
@@ -18,14 +25,18 @@ export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<stri
     const id = selectedId.value;
     changed.value;
     if (!id) return;
-    api.measuredCasts(id).then(
-      (casts) => {
-        if (selectedId.peek() === id) found.value = casts;
-      },
-      (error: unknown) => {
-        if (selectedId.peek() === id) fault.value = said(error);
-      },
-    );
+    const look = () =>
+      void api.measuredCasts(id).then(
+        (casts) => {
+          if (selectedId.peek() === id) found.value = casts;
+        },
+        (error: unknown) => {
+          if (selectedId.peek() === id) fault.value = said(error);
+        },
+      );
+    look();
+    const timer = setInterval(look, AGAIN_MS);
+    return () => clearInterval(timer);
   });
   if (found.value.length === 0) return null;
   return (
@@ -40,11 +51,15 @@ export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<stri
             <Button
               id="cast-fill-in"
               onClick={() =>
-                show({ ...cast, profile: cast.profile as Cast["profile"] }, nameOf(cast), cast.file)
+                show({ ...cast, profile: cast.profile as Cast["profile"] }, nameOf(cast), sourceOf(cast))
               }
             >
               {say("casts.fillIn")}
             </Button>
+            <details data-testid="cast-profile">
+              <summary>{say("casts.profile")}</summary>
+              <CastChart cast={cast} />
+            </details>
           </li>
         ))}
       </ul>
@@ -55,10 +70,20 @@ export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<stri
 const nameOf = ({ vehicle, time }: VehicleCastView): string =>
   `${vehicle} ${time.slice(0, 16).replace("T", " ")}`;
 
+/** The log, or what measured it, as the source of a cast. */
+const sourceOf = ({ vehicle, file, probe }: VehicleCastView): string =>
+  file ?? [vehicle, probe].filter(Boolean).join(" ");
+
 /** When it was measured, how deep it goes, and how well single speeds agree. */
-const about = ({ time, profile, sd_mps, samples }: VehicleCastView): string =>
+const about = ({ time, file, profile, sd_mps, samples, lag_mps }: VehicleCastView): string =>
   [
     dayAndTimeUtc(new Date(time)),
     say("casts.downTo", { depth: metres(profile.at(-1)?.[0]) }),
     say("casts.speeds", { samples: count(samples), sd: fixed(sd_mps, 1) }),
-  ].join(" · ");
+    lag_mps != null && Math.abs(lag_mps) > LAGS_MPS
+      ? say("casts.lags", { lag: fixed(Math.abs(lag_mps), 1) })
+      : "",
+    file ?? say("casts.sent"),
+  ]
+    .filter((part) => part !== "")
+    .join(" · ");
