@@ -24,8 +24,8 @@ from app.missions.operations.imports.log_batches import (
     UnreadLog,
 )
 
-MAX_SAID_BYTES = 1 << 16
-"""Of anything besides a batch."""
+MAX_SAID_BYTES = 1 << 18
+"""Of anything besides a batch: the casts of a day, told as finely as they may be, are a third of it."""
 
 
 class _Ping(BaseModel):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.mapping.water.measured_casts import SoundSpeedSamples, measured_casts
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport, VehicleReport
 from app.missions.operations.imports import log_process
@@ -79,6 +80,16 @@ def test_every_kind_of_item_is_understood_as_it_was_meant() -> None:
     (found,) = log_process._item(said(sounding(range_m=math.nan))).reports
     assert isinstance(found, SoundingReport)
     assert math.isnan(found.range_m)
+
+
+def test_the_casts_of_a_log_of_a_day_are_understood() -> None:
+    time_s = 1e9 + np.arange(0.0, 86_400.0)
+    depth_m = 60.0 * (1.0 - np.abs(2.0 * (time_s % 1800.0) / 1800.0 - 1.0))
+    place = np.full(len(time_s), LAT), np.full(len(time_s), LON)
+    casts = measured_casts(SoundSpeedSamples(time_s, depth_m, 1512.34 - 0.123 * depth_m, *place))
+    assert (len(casts), len(casts[0].profile)) == (24, 100)
+    facts = LogFacts(1, 2, 3, True, {"a": 1}, {}, ["note"], casts)
+    assert log_process._item(item_bytes(facts)) == facts
 
 
 async def test_a_process_that_tells_of_another_vehicle_is_not_believed(
