@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
-from pydantic import AwareDatetime
+from pydantic import Field
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
@@ -37,6 +37,8 @@ router = APIRouter(
 
 S44Order = Annotated[Order, Query(description="Order of IHO S-44 that differences between casts are compared with")]
 CastName = Annotated[str, Path(min_length=1, max_length=MOST_NAME, description="Name of a sound speed cast")]
+
+VehicleTime = Annotated[float, Field(ge=0, lt=1e11, description="Unix seconds of the vehicle's clock")]
 
 _CHANGE = body_problems("mission-not-found")
 
@@ -105,14 +107,14 @@ async def get_measured_casts(
     reader: Reader,
     mission: Mission,
     vehicle: Annotated[VehicleName | None, Query(description="Whose; default: of all")] = None,
-    since: Annotated[AwareDatetime | None, Query(description="Of what was measured from then on")] = None,
-    until: Annotated[AwareDatetime | None, Query(description="Of what was measured until then")] = None,
+    from_s: Annotated[VehicleTime | None, Query(description="Of what was measured from then on")] = None,
+    until_s: Annotated[VehicleTime | None, Query(description="Of what was measured until then")] = None,
 ) -> list[VehicleCastView]:
     """Return the casts that vehicles measured, as they sent them and in logs that were imported, oldest first.
 
     None counts before it is added. Where a log was imported, it stands for what its vehicle sent meanwhile.
     """
-    return await measured_casts.vehicles_casts(mission, vehicle=vehicle, since=since, until=until)
+    return await measured_casts.vehicles_casts(mission, vehicle=vehicle, from_s=from_s, until_s=until_s)
 
 
 @router.post(

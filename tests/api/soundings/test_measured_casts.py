@@ -2,7 +2,7 @@
 
 import math
 import time
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import httpx
@@ -109,16 +109,15 @@ async def depths_of_beams(client: httpx.AsyncClient, path: str) -> np.ndarray:
 
 
 async def test_casts_are_of_a_vehicle_and_a_time(client: httpx.AsyncClient, path: str) -> None:
-    def utc(after_s: float) -> str:
-        return datetime.fromtimestamp(BEGIN_S + after_s, UTC).isoformat()
-
     await post(client, path, dive())
     assert len(await measured(client, path, vehicle="rover")) == 1
     assert await measured(client, path, vehicle="another") == []
-    (down,) = await measured(client, path, until=utc(150.0))
+    (down,) = await measured(client, path, until_s=BEGIN_S + 150.0)
     assert down["lag_mps"] is None
     assert datetime.fromisoformat(down["time"]).timestamp() == pytest.approx(BEGIN_S + 75.0, abs=10.0)
-    assert await measured(client, path, since=utc(1000.0)) == []
+    assert await measured(client, path, from_s=BEGIN_S + 1000.0) == []
+    answer = await client.get(f"{path}/sound-speed/measured", params={"from_s": "nan"})
+    assert answer.status_code == 422
 
 
 async def test_nonsense_of_a_vehicle_never_becomes_a_cast(client: httpx.AsyncClient, path: str) -> None:

@@ -1,5 +1,6 @@
 """Sound speed casts that vehicles measured on their way, as they sent them and as their logs tell."""
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from datetime import datetime
@@ -20,8 +21,8 @@ async def vehicles_casts(
     live: LiveMission,
     *,
     vehicle: str | None = None,
-    since: datetime | None = None,
-    until: datetime | None = None,
+    from_s: float | None = None,
+    until_s: float | None = None,
 ) -> list[VehicleCastView]:
     """Return the casts that vehicles measured, in the order of their times.
 
@@ -31,23 +32,22 @@ async def vehicles_casts(
     ----------
     vehicle
         Whose; None: of all.
-    since, until
-        Casts are made of what was measured between these times, by the vehicle's clock; those of logs are made already,
-        and are returned where they lie between.
+    from_s, until_s
+        Casts are made of what was measured between these times, Unix seconds of the vehicle's clock; those of logs are
+        made already, and are returned where they lie between. None: no bound.
     """
     await live.journal.flush()
     await live.sound_speeds.flush()
-    first_s, last_s = (None if moment is None else moment.timestamp() for moment in (since, until))
     async with live.database.reading() as session:
         events = await event_queries.events_of_kind(session, live.id, "import")
-        rows = await sound_speed_queries.samples(session, live.id, vehicle=vehicle, first_s=first_s, last_s=last_s)
+        rows = await sound_speed_queries.samples(session, live.id, vehicle=vehicle, first_s=from_s, last_s=until_s)
     logs = [row.data for row in events if row.data.get("casts") and row.data.get("log") not in live.pings.taken_back]
     found: dict[tuple[str, datetime], VehicleCastView] = {}
     for log in logs:
         for cast in log["casts"]:
             view = VehicleCastView(vehicle=log["vehicle"], file=log["file"], **cast)
-            is_wanted = (vehicle or view.vehicle) == view.vehicle
-            if is_wanted and (since is None or view.time >= since) and (until is None or view.time <= until):
+            within = (from_s or 0.0) <= view.time.timestamp() <= (math.inf if until_s is None else until_s)
+            if within and vehicle in (None, view.vehicle):
                 # A log that was sent again tells the same.
                 found[view.vehicle, view.time] = view
     for view in await made_of(rows, _sent_casts, rows):

@@ -519,8 +519,8 @@ class Operations(ABC):
         mission_id: str,
         *,
         vehicle: str | None = None,
-        since: datetime | None = None,
-        until: datetime | None = None,
+        from_s: float | None = None,
+        until_s: float | None = None,
     ) -> list[models.VehicleCastView]:
         """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``.
 
@@ -528,16 +528,16 @@ class Operations(ABC):
         ----------
         vehicle : str
             Whose; default: of all
-        since : datetime
+        from_s : float
             Of what was measured from then on
-        until : datetime
+        until_s : float
             Of what was measured until then
         """
         return self._call(Call[list[models.VehicleCastView]](
             "GET",
             f"/missions/{part(mission_id)}/sound-speed/measured",
             list[models.VehicleCastView],
-            query={"vehicle": vehicle, "since": since, "until": until},
+            query={"vehicle": vehicle, "from_s": from_s, "until_s": until_s},
         ))
 
     def set_cast(
@@ -2255,8 +2255,8 @@ class AsyncOperations(ABC):
         mission_id: str,
         *,
         vehicle: str | None = None,
-        since: datetime | None = None,
-        until: datetime | None = None,
+        from_s: float | None = None,
+        until_s: float | None = None,
     ) -> list[models.VehicleCastView]:
         """See the sound speed casts that vehicles measured: ``GET /missions/{mission_id}/sound-speed/measured``.
 
@@ -2264,16 +2264,16 @@ class AsyncOperations(ABC):
         ----------
         vehicle : str
             Whose; default: of all
-        since : datetime
+        from_s : float
             Of what was measured from then on
-        until : datetime
+        until_s : float
             Of what was measured until then
         """
         return await self._call(Call[list[models.VehicleCastView]](
             "GET",
             f"/missions/{part(mission_id)}/sound-speed/measured",
             list[models.VehicleCastView],
-            query={"vehicle": vehicle, "since": since, "until": until},
+            query={"vehicle": vehicle, "from_s": from_s, "until_s": until_s},
         ))
 
     async def set_cast(

@@ -13639,9 +13639,9 @@ export interface operations {
                 /** @description Whose; default: of all */
                 vehicle?: string;
                 /** @description Of what was measured from then on */
-                since?: string;
+                from_s?: number;
                 /** @description Of what was measured until then */
-                until?: string;
+                until_s?: number;
             };
             header?: never;
             path: {
