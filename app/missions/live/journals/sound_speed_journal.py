@@ -4,6 +4,7 @@ A vehicle that changes its depth measures the water, one that keeps it the same 
 time it has gone through a step of depth, the latter now and then.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -73,9 +74,7 @@ class SoundSpeedJournal(WriteBehind[SoundSpeedReport]):
         """
         if not is_possible(report.speed_mps) or not LEAST_DEPTH_M <= report.position.depth_m <= DEEPEST_M:
             return
-        ahead_s = report.time_s - self._time_scale * now().timestamp()
-        most_s = CLOCK_S * max(self._time_scale, 1.0)
-        if not ahead_s <= most_s or (ahead_s < -most_s and not posted):
+        if not math.isfinite(report.time_s) or self._is_off(report.time_s, posted=posted):
             return
         probes = self._probes.setdefault(report.vehicle, {})
         last, depth_m = probes.get(report.source), report.position.depth_m
@@ -88,6 +87,11 @@ class SoundSpeedJournal(WriteBehind[SoundSpeedReport]):
                 return
         probes[report.source] = _Probe(report.time_s, depth_m)
         self._note(report)
+
+    def _is_off(self, time_s: float, *, posted: bool) -> bool:
+        """Tell whether a vehicle's clock is too far from ours; in simulated time clocks are not compared."""
+        ahead_s = time_s - now().timestamp()
+        return self._time_scale == 1.0 and (ahead_s > CLOCK_S or (ahead_s < -CLOCK_S and not posted))
 
     async def _store(self, noted: Sequence[SoundSpeedReport], session: AsyncSession) -> Committed:
         if self._counts is None:
