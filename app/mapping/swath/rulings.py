@@ -5,6 +5,7 @@ Beams are told by the time of their ping and their place in it, so that they sta
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +37,14 @@ class BeamSet:
         order = np.argsort(time_s[some], kind="stable")
         return cls(time_s[some][order], np.packbits(chosen[some][order], axis=1))
 
+    @cached_property
+    def count(self) -> int:
+        """How many beams these are."""
+        return int(np.bitwise_count(self.bits).sum())
+
     def __len__(self) -> int:
         """Return how many beams these are."""
-        return int(np.unpackbits(self.bits).sum())
+        return self.count
 
     def among(self, time_s: FloatArray, beams: int) -> BoolArray:
         """Return which beams of pings (n,), of so many beams each, are of them, (n, beams)."""

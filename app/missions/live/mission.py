@@ -14,6 +14,7 @@ from app.compute.compute import Compute
 from app.estimation import Sensor, SingleBeam
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
+from app.mapping.swath.rulings import BeamRulings
 from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetEvent, VehicleReport
@@ -309,9 +310,12 @@ class LiveMission:
         self.journal.tell_of_missing_level()
         self.map.shown_otherwise()
 
-    def edit_beams(self, edits: Mapping[int, BeamEdit]) -> None:
-        """Let operators have said this of beams, as the database has it; the caller holds the journal's ``writing``."""
-        self.corrections.edit_beams(edits)
+    def edit_beams(self, edits: Mapping[int, BeamEdit], rulings: BeamRulings) -> None:
+        """Let operators have said this of beams, as the database has it; ``rulings``: what counts of it.
+
+        The caller holds the journal's ``writing``.
+        """
+        self.corrections.edit_beams(edits, rulings)
         self.swath.correct(self.corrections.now)
         self.recount(self.journal.counts)
         self.map.shown_otherwise()

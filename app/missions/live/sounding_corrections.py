@@ -6,6 +6,7 @@ from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.swath.rulings import BeamRulings
 from app.missions.live.header import StoredMission
 from app.missions.soundings.beam_edits import BeamEdit, rulings_of
 from app.missions.soundings.corrections import Corrections
@@ -61,10 +62,10 @@ class SoundingCorrections:
         """Correct by others from now on."""
         self.gate.corrections = corrections
 
-    def edit_beams(self, edits: Mapping[int, BeamEdit]) -> None:
-        """Let operators have said this of beams."""
+    def edit_beams(self, edits: Mapping[int, BeamEdit], rulings: BeamRulings) -> None:
+        """Let operators have said this of beams; ``rulings``: what counts of it."""
         self.beam_edits = dict(edits)
-        self.apply(self.now.ruled(rulings_of(edits)))
+        self.apply(self.now.ruled(rulings))
 
     def state_mounting(self, spec: MissionSpec, vehicle: str, mounting: MountingSpec) -> bool:
         """Note how a vehicle says that its sonar is mounted; returns whether that is new."""

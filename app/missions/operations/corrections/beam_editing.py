@@ -18,7 +18,7 @@ from app.mapping.swath.spikes import states_of
 from app.missions.clock import now
 from app.missions.errors import BeamEditNotFoundError, ConflictError
 from app.missions.live.mission import LiveMission
-from app.missions.soundings.beam_edits import BeamEdit
+from app.missions.soundings.beam_edits import BeamEdit, rulings_of
 from app.missions.views.measurements.beams import (
     BeamEditsView,
     BeamEditView,
@@ -126,7 +126,8 @@ async def _change(live: LiveMission, store: Callable[[AsyncSession], Awaitable[M
         async with live.database.writing() as session:
             edits = await store(session)
             await stored_maps.forget(session, live.id)
-        live.edit_beams(edits)
+        # Of millions of beams it takes long to tell what counts.
+        live.edit_beams(edits, await live.in_background(rulings_of, edits))
 
     async with live.correcting, live.journal.writing:
         await to_the_end(commit())
