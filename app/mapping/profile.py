@@ -9,7 +9,7 @@ from app.mapping.types import BathymetricMap, Grid
 
 
 @dataclass(frozen=True)
-class Line:
+class ProfileLine:
     """A line of straight pieces in the local frame, cut into equal steps.
 
     Attributes
@@ -67,7 +67,7 @@ class Beside:
     rows: np.ndarray
 
 
-def line_through(corners_m: FloatArray, spacing_m: float) -> Line:
+def line_through(corners_m: FloatArray, spacing_m: float) -> ProfileLine:
     """Return the line through corners, shape (k, 2), with points at most ``spacing_m`` apart, its ends among them.
 
     Corners that repeat the one before are left out.
@@ -88,10 +88,10 @@ def line_through(corners_m: FloatArray, spacing_m: float) -> Line:
     steps = max(1, int(np.ceil(at[-1] / spacing_m - 1e-9)))
     along = np.linspace(0.0, at[-1], steps + 1)
     points = np.column_stack([np.interp(along, at, corners[:, axis]) for axis in (0, 1)])
-    return Line(corners, along, points)
+    return ProfileLine(corners, along, points)
 
 
-def profile_along(bathymetry: BathymetricMap, line: Line) -> Profile:
+def profile_along(bathymetry: BathymetricMap, line: ProfileLine) -> Profile:
     """Return depth and deviation of a map along a line."""
     inside, row, col = cells_of(bathymetry.grid, line.points_m)
     sounded = np.zeros(len(line.along_m), dtype=bool)
@@ -103,7 +103,7 @@ def profile_along(bathymetry: BathymetricMap, line: Line) -> Profile:
     )
 
 
-def layer_along(grid: Grid, values: FloatArray, line: Line) -> FloatArray:
+def layer_along(grid: Grid, values: FloatArray, line: ProfileLine) -> FloatArray:
     """Return a layer's value in the cell that each point lies in, shape (n,); NaN outside."""
     inside, row, col = cells_of(grid, line.points_m)
     found = np.full(len(line.along_m), np.nan)
@@ -118,7 +118,7 @@ def cells_of(grid: Grid, points_m: FloatArray) -> tuple[BoolArray, np.ndarray, n
     return (row >= 0) & (row < grid.rows) & (col >= 0) & (col < grid.cols), row, col
 
 
-def beside(line: Line, places_m: FloatArray, within_m: float) -> Beside:
+def beside(line: ProfileLine, places_m: FloatArray, within_m: float) -> Beside:
     """Return which places, shape (p, 2), lie at most ``within_m`` from the line, each beside its nearest piece.
 
     Places beyond the line's ends are not beside it.

@@ -46,7 +46,7 @@ NOT_ON_BOARD = Refusal(
 )
 
 
-class Step(StrEnum):
+class OnboardStep(StrEnum):
     """What is to be done next on board."""
 
     NOTHING = "nothing"
@@ -85,7 +85,7 @@ class WayHome:
         self._request_ids = request_ids
         self._way: tuple[Waypoint, ...] = ()
         self._stopped = False
-        self._step = Step.NOTHING
+        self._step = OnboardStep.NOTHING
         self._tries = 0
         self._due = -math.inf
         self._request_id = -1
@@ -93,19 +93,19 @@ class WayHome:
     @property
     def wanted(self) -> bool:
         """Whether there is one, or one is still to be removed."""
-        return bool(self._way) or self._step is not Step.NOTHING
+        return bool(self._way) or self._step is not OnboardStep.NOTHING
 
     @property
     def busy(self) -> bool:
         """Whether an answer is still to be expected."""
-        return self._step is not Step.NOTHING and self.refusal is None
+        return self._step is not OnboardStep.NOTHING and self.refusal is None
 
     @property
     def text(self) -> str:
         """How far it has come, in words; empty when there is none."""
         if self.refusal is not None:
             return f"not kept: {self.refusal.reason}"
-        if self._step in (Step.WAIT, Step.STORE):
+        if self._step in (OnboardStep.WAIT, OnboardStep.STORE):
             return "being stored"
         if not self._way:
             return ""
@@ -118,7 +118,7 @@ class WayHome:
 
     def keep(self, way: Sequence[Waypoint]) -> None:
         """Store this way in place of the former one, unless it is there already."""
-        there = self._step is Step.NOTHING and self.refusal is None and not self._stopped
+        there = self._step is OnboardStep.NOTHING and self.refusal is None and not self._stopped
         if not there or tuple(way) != self._way:
             self._way = tuple(way)
             self._store()
@@ -126,13 +126,13 @@ class WayHome:
     def drop(self) -> None:
         """Leave nothing on board."""
         self._way = ()
-        self._next(Step.DISARM)
+        self._next(OnboardStep.DISARM)
 
     def stopped(self) -> None:
         """Disarm it: the vehicle was stopped, and stays where it is."""
         if self._way and not self._stopped:
             self._stopped = True
-            self._next(Step.DISARM)
+            self._next(OnboardStep.DISARM)
 
     def engaged(self) -> None:
         """Store it again, which arms it after a stop, an abort or a restart."""
@@ -152,27 +152,27 @@ class WayHome:
         if int(message.request_id) != self._request_id or kind not in (_SUCCESS, _FAILURE):
             return
         match self._step:
-            case Step.STORE if kind == _SUCCESS:
-                self._next(Step.NOTHING)
-            case Step.STORE:
-                self._next(Step.NOTHING)
+            case OnboardStep.STORE if kind == _SUCCESS:
+                self._next(OnboardStep.NOTHING)
+            case OnboardStep.STORE:
+                self._next(OnboardStep.NOTHING)
                 reason = f"its plan database refuses the way home: {text(message, 'info') or 'no reason given'}"
                 self.refusal = Refusal(reason, "Look at the vehicle's own log")
-            case Step.DISARM:
+            case OnboardStep.DISARM:
                 # Without a plan the database always refuses; the task has heard it all the same.
-                self._next(Step.DELETE)
-            case Step.DELETE:
-                self._next(Step.NOTHING)
+                self._next(OnboardStep.DELETE)
+            case OnboardStep.DELETE:
+                self._next(OnboardStep.NOTHING)
 
     # The passing of time
 
     def tick(self, now: float) -> None:
         """Send what is due."""
-        if self._step is Step.NOTHING:
+        if self._step is OnboardStep.NOTHING:
             return
         if status_of(self._node, now).state in _OUT_OF_REACH:
             self._unconfirmed("it is out of reach", now)
-        elif self._step is Step.WAIT:
+        elif self._step is OnboardStep.WAIT:
             self._wait(now)
         elif now < self._due:
             return
@@ -186,16 +186,16 @@ class WayHome:
         """Wait until it is known how the task is configured; whoever does not tell has DUNE's defaults, likely."""
         node = self._node
         if node.entities is not None and node.lost_comms_task is None:
-            self._next(Step.NOTHING)
+            self._next(OnboardStep.NOTHING)
             self.refusal = NOT_ON_BOARD
         elif node.lost_comms is not None or self._tries >= TRIES:
-            self._next(Step.STORE)
+            self._next(OnboardStep.STORE)
         elif now >= self._due:
             self._count(now)
 
     def _store(self) -> None:
         self._stopped = False
-        self._next(Step.WAIT)
+        self._next(OnboardStep.WAIT)
 
     def _count(self, now: float) -> None:
         self._tries += 1
@@ -206,18 +206,18 @@ class WayHome:
         self.refusal = Refusal(words, "It is sent again when the vehicle answers")
         self._tries, self._due = 0, again_at
 
-    def _next(self, step: Step) -> None:
+    def _next(self, step: OnboardStep) -> None:
         self._step, self._tries, self._due, self.refusal = step, 0, -math.inf, None
         self._request_id = next(self._request_ids) & 0xFFFF
 
     def _request(self) -> Message:
         request = imcpy.PlanDB()
         request.type = imcpy.PlanDB.TypeEnum.REQUEST
-        request.op = _Operation.DEL if self._step is Step.DELETE else _Operation.SET
+        request.op = _Operation.DEL if self._step is OnboardStep.DELETE else _Operation.SET
         request.request_id = self._request_id
         task = self._node.lost_comms
         request.plan_id = DEFAULT_PLAN_NAME if task is None else task.plan_name
-        if self._step is Step.STORE:
+        if self._step is OnboardStep.STORE:
             request.arg = home_plan(request.plan_id, home_prefix(self._settings.plan_id), self._way)
         return request
 

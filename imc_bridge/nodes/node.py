@@ -17,7 +17,7 @@ from imc_bridge.network.text_fields import text
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.lost_comms import is_lost_comms, read_lost_comms
 from imc_bridge.nodes.modes import OperationMode, PlanState, mode_name
-from imc_bridge.nodes.plausibility import PlausiblePlace, Step
+from imc_bridge.nodes.plausibility import PlausiblePlace, PositionVerdict
 from imc_bridge.nodes.rate_meter import RateMeter
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
@@ -292,9 +292,9 @@ class Node:
             time_s, lat, lon, message.depth, message.phi, message.theta, math.remainder(message.psi, math.tau)
         )
         step = self.places.take(sample)
-        if step is Step.DOUBTFUL:
+        if step is PositionVerdict.DOUBTFUL:
             return Refused.PLACE
-        if step is Step.MOVED:
+        if step is PositionVerdict.MOVED:
             # Nothing was measured on a line between the two places.
             self.history.clear()
         if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):

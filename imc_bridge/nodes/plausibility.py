@@ -17,7 +17,7 @@ CONFIRM_S = 1.0
 """A position far away is believed when enough states over at least this time agree, and none came from the old one."""
 
 
-class Step(Enum):
+class PositionVerdict(Enum):
     """The verdict on a position."""
 
     GOOD = "good"
@@ -39,21 +39,21 @@ class PlausiblePlace:
         """The newest position that was believed; None before there is any."""
         return self._last
 
-    def take(self, sample: StateSample) -> Step:
+    def take(self, sample: StateSample) -> PositionVerdict:
         """Say whether the vehicle can be there."""
         if self._last is None or _within_reach(self._last, sample):
             self._odd.clear()
             if self._last is None or sample.time_s >= self._last.time_s:
                 self._last = sample
-            return Step.GOOD
+            return PositionVerdict.GOOD
         if self._odd and not _within_reach(self._odd[-1], sample):
             self._odd.clear()
         self._odd.append(sample)
         if len(self._odd) < CONFIRMATIONS or sample.time_s - self._odd[0].time_s < CONFIRM_S:
-            return Step.DOUBTFUL
+            return PositionVerdict.DOUBTFUL
         self._odd.clear()
         self._last = sample
-        return Step.MOVED
+        return PositionVerdict.MOVED
 
     def clear(self) -> None:
         """Forget where it was, as after a jump of its clock."""

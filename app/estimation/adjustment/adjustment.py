@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from app.arrays import BoolArray, FloatArray
-from app.estimation.adjustment.drift import LEAST_FIX_M, DriftModel, Nodes
+from app.estimation.adjustment.drift import LEAST_FIX_M, DriftModel, DriftNodes
 from app.estimation.adjustment.least_squares import DriftModels, LeastSquares, Solution, WeighedTies
 from app.estimation.adjustment.ties import KnownShift, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
@@ -113,7 +113,7 @@ class AdjustedTracks:
         Whether ties were used. Else the held-out ones did not fit better, and fixes alone did it.
     """
 
-    nodes: Nodes
+    nodes: DriftNodes
     offset_m: FloatArray
     sd_m: FloatArray
     before_sd_m: FloatArray
@@ -170,7 +170,7 @@ def adjusted(
         raise ValueError("there is no sounding along which a track could be adjusted")
     if not 0.0 <= offset_sd_m < np.inf:
         raise ValueError(f"offset_sd_m: {offset_sd_m} is no standard deviation; 0 or more is, 0 for none")
-    nodes = Nodes.along(soundings, fixes, node_s)
+    nodes = DriftNodes.along(soundings, fixes, node_s)
     fixes = replace(fixes, sd_m=np.maximum(fixes.sd_m, LEAST_FIX_M))
     models = DriftModels(nodes, fixes, (model or DriftModel()).usable())
     problem = LeastSquares(nodes, fixes, models.typical())

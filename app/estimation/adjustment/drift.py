@@ -95,7 +95,7 @@ class DriftModel:
 
 
 @dataclass(frozen=True)
-class Nodes:
+class DriftNodes:
     """Nodes of all tracks, m of them; errors between two of a dive are linear in time.
 
     Attributes
@@ -116,7 +116,7 @@ class Nodes:
         return len(self.time_s)
 
     @classmethod
-    def along(cls, soundings: TrackSoundings, fixes: Fixes, spacing_s: float) -> "Nodes":
+    def along(cls, soundings: TrackSoundings, fixes: Fixes, spacing_s: float) -> "DriftNodes":
         """Return nodes about so many seconds apart, from the first sounding or fix of each dive to its last."""
         vehicle: list[int] = []
         dives: list[FloatArray] = []
@@ -187,7 +187,7 @@ def _places(soundings: TrackSoundings, vehicle: int, time_s: FloatArray) -> Floa
     return np.column_stack([np.interp(time_s - begin, at, east), np.interp(time_s - begin, at, north)])
 
 
-def prior_rows(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csr_array, ComplexArray]:
+def prior_rows(nodes: DriftNodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csr_array, ComplexArray]:
     """Return what drift and fixes say of errors and rates, whose real part is east and imaginary one north.
 
     Returns

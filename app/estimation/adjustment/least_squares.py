@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
 from app.arrays import FloatArray, IntArray
-from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
+from app.estimation.adjustment.drift import DriftModel, DriftNodes, prior_rows
 from app.estimation.adjustment.ties import Outcome, Tie
 from app.estimation.adjustment.tracks import Fixes
 
@@ -56,7 +56,7 @@ class Solution:
 class LeastSquares:
     """The least-squares problem: unknowns are those of :func:`prior_rows`, east first, then north."""
 
-    def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
+    def __init__(self, nodes: DriftNodes, fixes: Fixes, model: DriftModel) -> None:
         self._m = len(nodes)
         self.model = model
         self._normal, self._right = _normal(nodes, fixes, model)
@@ -134,7 +134,7 @@ class DriftModels:
     weigh: their errors go together, and they count as a share of what they say, so that too little drift would do.
     """
 
-    def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
+    def __init__(self, nodes: DriftNodes, fixes: Fixes, model: DriftModel) -> None:
         variants = model.variants()
         self._problems = [LeastSquares(nodes, fixes, one) for one, _ in variants]
         self._nodes = nodes
@@ -171,7 +171,7 @@ class DriftModels:
         return mean, np.sqrt(variance), np.sqrt(before_variance)
 
 
-def _normal(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csc_array, FloatArray]:
+def _normal(nodes: DriftNodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csc_array, FloatArray]:
     """Return the normal matrix (2 u, 2 u) and its right side (2 u,) without ties."""
     matrix, right = prior_rows(nodes, fixes, model)
     normal = sparse.csc_array(matrix.conj().T @ matrix)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
-from app.estimation.adjustment.surface import Shares, Surface
+from app.estimation.adjustment.surface import CellWeights, Surface
 
 WIDE = 3.0
 """Residuals beyond so many deviations count as if they grew linearly."""
@@ -133,7 +133,9 @@ def residuals(section: SectionSoundings, bottom: Surface, within: float) -> Floa
 
 
 @njit(cache=True, nogil=True)
-def influence(section: SectionSoundings, bottom: Surface, shares: Shares, own: FloatArray, others: FloatArray) -> None:
+def influence(
+    section: SectionSoundings, bottom: Surface, shares: CellWeights, own: FloatArray, others: FloatArray
+) -> None:
     """Add to each of the section's soundings (n,) and of the others' (m,) how much a tie depends on where it is.
 
     That is the squared slope of the bottom over the variance.

@@ -26,7 +26,7 @@ class SoundingColumns(NamedTuple):
     sd: FloatArray
 
 
-class Raster(NamedTuple):
+class RasterFrame(NamedTuple):
     """Where a raster lies: its south-western corner and the side of its cells, metres."""
 
     west: float
@@ -55,7 +55,7 @@ class Surface(NamedTuple):
     nearest: FloatArray
 
 
-class Shares(NamedTuple):
+class CellWeights(NamedTuple):
     """Which soundings each cell was predicted from, -1 for none, and their weights; (rows, cols, NEIGHBOURS) each."""
 
     who: IntArray
@@ -135,7 +135,7 @@ def _solve(a: FloatArray, b: FloatArray, n: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _binned(soundings: SoundingColumns, raster: Raster, rows: int, cols: int, reach: float) -> _Bins:
+def _binned(soundings: SoundingColumns, raster: RasterFrame, rows: int, cols: int, reach: float) -> _Bins:
     """Sort soundings into cells, those within ``reach`` metres of a raster among them."""
     east, north = soundings.east, soundings.north
     border = int(np.ceil(reach / raster.cell))
@@ -162,7 +162,7 @@ def _binned(soundings: SoundingColumns, raster: Raster, rows: int, cols: int, re
 @njit(cache=True, nogil=True)
 def _nearest_by_quadrant(
     soundings: SoundingColumns,
-    raster: Raster,
+    raster: RasterFrame,
     bins: _Bins,
     r: int,
     c: int,
@@ -227,8 +227,8 @@ def _kriging_system(
 
 @njit(cache=True, nogil=True)
 def surface(
-    soundings: SoundingColumns, raster: Raster, wanted: BoolArray, relief: PowerLaw, reach: float
-) -> tuple[Surface, Shares]:
+    soundings: SoundingColumns, raster: RasterFrame, wanted: BoolArray, relief: PowerLaw, reach: float
+) -> tuple[Surface, CellWeights]:
     """Predict the depth at the centres of a raster's cells by ordinary kriging, from soundings within ``reach`` metres.
 
     Only cells that are ``wanted`` (rows, cols) are predicted.
@@ -271,11 +271,13 @@ def surface(
                 v += x[i] * right[i]
                 who[r, c, i], share[r, c, i] = near[i], x[i]
             value[r, c], variance[r, c], nearest[r, c] = z, max(v + x[m], 0.0), least
-    return Surface(value, variance, nearest), Shares(who, share)
+    return Surface(value, variance, nearest), CellWeights(who, share)
 
 
 @njit(cache=True, nogil=True)
-def near_track(east: FloatArray, north: FloatArray, raster: Raster, rows: int, cols: int, aside: float) -> BoolArray:
+def near_track(
+    east: FloatArray, north: FloatArray, raster: RasterFrame, rows: int, cols: int, aside: float
+) -> BoolArray:
     """Return which cells are within some distance east and north of a sounding, (rows, cols)."""
     west, south, cell = raster
     wanted = np.zeros((rows, cols), dtype=np.bool_)

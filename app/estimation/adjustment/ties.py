@@ -7,7 +7,7 @@ import numpy as np
 
 from app.arrays import FloatArray, IntArray
 from app.estimation.adjustment import misfit, surface
-from app.estimation.adjustment.drift import Nodes
+from app.estimation.adjustment.drift import DriftNodes
 from app.estimation.adjustment.tracks import TrackSoundings
 
 LEAST_SOUNDINGS = 8
@@ -156,9 +156,9 @@ class Around:
 
     who: IntArray
     """Rows of the soundings that were used."""
-    raster: surface.Raster
+    raster: surface.RasterFrame
     bottom: surface.Surface
-    shares: surface.Shares
+    shares: surface.CellWeights
     """Of those rows."""
 
 
@@ -183,7 +183,7 @@ class Matcher:
 
     soundings: TrackSoundings
     sections: Sections
-    nodes: Nodes
+    nodes: DriftNodes
     relief: Relief
     cell_m: float
     reach_m: float
@@ -208,7 +208,7 @@ class Matcher:
         who = who[~(own & (found.time_s[who] < high_s))]
         if not len(who):
             return None
-        raster = surface.Raster(west, south, self.cell_m)
+        raster = surface.RasterFrame(west, south, self.cell_m)
         wanted = surface.near_track(east, north, raster, high, cols, aside_m)
         others = surface.SoundingColumns(east_m[who], north_m[who], found.depth_m[who], found.sd_m[who])
         relief = surface.PowerLaw(float(self.relief.factor[section]), self.relief.exponent)
@@ -228,7 +228,7 @@ class Matcher:
         return max(0.5 * self.reach_m, self.cell_m)
 
     def _section(
-        self, section: int, raster: surface.Raster, east_m: FloatArray, north_m: FloatArray
+        self, section: int, raster: surface.RasterFrame, east_m: FloatArray, north_m: FloatArray
     ) -> misfit.SectionSoundings:
         rows = slice(self.sections.first[section], self.sections.first[section + 1])
         x = (east_m[rows] - raster.west) / raster.cell - 0.5

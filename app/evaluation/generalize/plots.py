@@ -8,14 +8,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from app.evaluation.generalize.summary import Run, figure_of, worst_of
-from app.evaluation.generalize.tasks import Task
+from app.evaluation.generalize.tasks import TableTask
 from simulator.floors.unseen_floors import unseen_floor
 
 DPI = 60
 PANEL = 3.0
 
 
-def draw_worst(name: str, task: Task, runs: Sequence[Run], file: Path) -> None:
+def draw_worst(name: str, task: TableTask, runs: Sequence[Run], file: Path) -> None:
     """Write the picture of a task's worst floors."""
     chosen = worst_of(task, runs)
     figure = Figure(figsize=(PANEL * len(chosen), PANEL + 0.5), layout="constrained")

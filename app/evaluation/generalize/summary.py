@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from app.evaluation.generalize.tasks import Task
+from app.evaluation.generalize.tasks import TableTask
 from app.evaluation.runs.summary import ROUNDING_PCT, spread
 
 WORST = 5
@@ -14,12 +14,12 @@ DONE_PCT = 1.0
 Run = Mapping[str, Any]
 
 
-def figure_of(task: Task, run: Run) -> float:
+def figure_of(task: TableTask, run: Run) -> float:
     """Return the figure that the table tells of a run: the ratio to a yardstick that was flown, or what is left."""
     return float(run["ours"] / run["yardstick"]) if task.relative else float(run["ours"])
 
 
-def worst_of(task: Task, runs: Sequence[Run]) -> list[Run]:
+def worst_of(task: TableTask, runs: Sequence[Run]) -> list[Run]:
     """Return the worst runs, the worst first."""
     return sorted(runs, key=lambda run: -figure_of(task, run))[:WORST]
 
@@ -29,7 +29,7 @@ def with_yardstick_done(runs: Sequence[Run]) -> list[Run]:
     return [run for run in runs if run["facts"].get("left_by_yardstick_pct", 0.0) <= DONE_PCT + ROUNDING_PCT]
 
 
-def summary_of(task: Task, runs: Sequence[Run]) -> dict[str, Any]:
+def summary_of(task: TableTask, runs: Sequence[Run]) -> dict[str, Any]:
     """Return the object of the command's JSON for a task that has runs.
 
     ``mean`` and ``ci95`` (half the width of the interval) are of the ratio or of what is left; ``difference`` is that
@@ -62,7 +62,7 @@ def summary_of(task: Task, runs: Sequence[Run]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _means(task: Task, runs: Sequence[Run]) -> dict[str, Any]:
+def _means(task: TableTask, runs: Sequence[Run]) -> dict[str, Any]:
     whole, paired = spread([figure_of(task, run) for run in runs]), spread([r["ours"] - r["yardstick"] for r in runs])
     return {
         "floors": len(runs),

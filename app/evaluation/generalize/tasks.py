@@ -13,7 +13,7 @@ from simulator.floors.unseen_floors import unseen_floor
 
 
 @dataclass(frozen=True)
-class Task:
+class TableTask:
     """One task of the table.
 
     Attributes
@@ -43,28 +43,28 @@ class Task:
     sensor: Sensor | None
 
 
-TASKS: dict[str, Task] = {
-    "explore": Task(
+TASKS: dict[str, TableTask] = {
+    "explore": TableTask(
         "steps to 99 % of 1100 landmarks", "the formation lawnmower", "none above 0.85 of it", True, flights.explore,
         (100.0, 100.0), RangeSensor(),
     ),
-    "track": Task(
+    "track": TableTask(
         "landmarks left of MED13's 1000, %", "the 1 % asked", "1 % left, targets tracked 90 % of the time", False,
         flights.track, (100.0, 100.0), RangeSensor(0.4, 0.1),
     ),
-    "pcao": Task(
+    "pcao": TableTask(
         "landmarks left, %, in the worse of two scenarios", "the 1 % asked", "1 % left in both scenarios", False,
         flights.pcao, (100.0, 100.0), RangeSensor(),
     ),
-    "search": Task(
+    "search": TableTask(
         "goal area not explored, %", "11.1 %, what ACCESS13's CAO leaves of its first car park",
         "no more, back in time, nothing touched", False, flights.search, (150.0, 150.0), Scanner(),
     ),
-    "survey": Task(
+    "survey": TableTask(
         "RMSE of the map, m", "the best of three patterns", "none above 1.05 of it", True, flights.survey,
         (100.0, 100.0), SingleBeam(0.01),
     ),
-    "coverage": Task(
+    "coverage": TableTask(
         "kilometres flown", "fixed lines, spaced for the shoalest depth", "none above 1.02 of them, no holiday", True,
         flights.coverage, (140.0, 100.0), None,
     ),

@@ -14,7 +14,7 @@ from app.exploration.lines.dealing import way_m
 from app.exploration.lines.even_survey import Pattern, even_survey, orders_across
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
 from app.exploration.lines.parts import parts_of
-from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value
+from app.exploration.survey.value import SurveyObjective, UncertaintyNodes, make_nodes, plan_value
 
 MARGIN_M = 0.5
 TO_BORDER = 0.4
@@ -36,7 +36,7 @@ LEAST_STRIP = 0.05
 """Who can hardly reach its strip gets one in proportion to this part of what it can fly."""
 
 
-class Strip(NamedTuple):
+class BackboneStrip(NamedTuple):
     """A vehicle's strip across the lines; how far its outer lines, and the ends of all, are from its border.
 
     Distances from the border are in spacings.
@@ -68,7 +68,9 @@ class Share:
     coarse: int
 
 
-def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objective: SurveyObjective) -> list[Share]:
+def backbone(
+    constraints: Constraints, vehicles: Vehicles, nodes: UncertaintyNodes, objective: SurveyObjective
+) -> list[Share]:
     """Return every vehicle's share of the even survey that promises the best map for what each can fly.
 
     Either there and back, or whole lines in order, whichever leaves less uncertainty. Where keep-out zones cut the area
@@ -87,7 +89,7 @@ def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objecti
 
 
 def _backbone_of_one(
-    constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objective: SurveyObjective
+    constraints: Constraints, vehicles: Vehicles, nodes: UncertaintyNodes, objective: SurveyObjective
 ) -> list[Share]:
     """Return :func:`backbone` of an area in one part."""
     axis = longer_axis_rad(constraints.area)
@@ -116,7 +118,7 @@ def _backbone_of_one(
 def there_and_back(
     sweep: Sweep,
     vehicles: Vehicles,
-    nodes: Nodes,
+    nodes: UncertaintyNodes,
     objective: SurveyObjective,
     to_border: float = TO_BORDER,
     to_end: float = TO_END,
@@ -148,7 +150,9 @@ def packed(routes: list[FloatArray]) -> tuple[FloatArray, np.ndarray]:
     return vias, counts
 
 
-def _strips(sweep: Sweep, vehicles: Vehicles, order: tuple[int, ...], to_border: float, to_end: float) -> list[Strip]:
+def _strips(
+    sweep: Sweep, vehicles: Vehicles, order: tuple[int, ...], to_border: float, to_end: float
+) -> list[BackboneStrip]:
     """Return the strips of the vehicles in the order in which they lie across the lines."""
     u, left_m = sweep.to_uv(vehicles.en_m)[list(order), 0], vehicles.left_m[list(order)]
     cuts = sweep.shares(np.maximum(left_m, 1.0))
@@ -156,13 +160,15 @@ def _strips(sweep: Sweep, vehicles: Vehicles, order: tuple[int, ...], to_border:
     cuts = sweep.shares(np.maximum(np.maximum(left_m - away, LEAST_STRIP * left_m), 1.0))
     last = len(order) - 1
     return [
-        Strip(float(cuts[k]), float(cuts[k + 1]), to_border if k == 0 else 0.5, to_border if k == last else 0.5, to_end)
+        BackboneStrip(
+            float(cuts[k]), float(cuts[k + 1]), to_border if k == 0 else 0.5, to_border if k == last else 0.5, to_end
+        )
         for k in range(len(order))
     ]
 
 
 def _best_share(
-    sweep: Sweep, vehicles: Vehicles, i: int, strip: Strip, nodes: Nodes, objective: SurveyObjective
+    sweep: Sweep, vehicles: Vehicles, i: int, strip: BackboneStrip, nodes: UncertaintyNodes, objective: SurveyObjective
 ) -> tuple[Share, float]:
     u = sweep.to_uv(nodes.en_m)[:, 0]
     inside = (u >= strip.low_u) & (u <= strip.high_u)
@@ -189,7 +195,9 @@ def _best_share(
     return best[1], best[0]
 
 
-def _there_and_back(sweep: Sweep, start: FloatArray, strip: Strip, n: int, *, forward: bool, upwards: bool) -> Share:
+def _there_and_back(
+    sweep: Sweep, start: FloatArray, strip: BackboneStrip, n: int, *, forward: bool, upwards: bool
+) -> Share:
     lines = strip.lines(n)
     lines = lines if forward else lines[::-1]
     out, back = lines[::2], lines[1::2][::-1]

@@ -11,7 +11,7 @@ from app.exploration.core.constraints import Constraints, Region
 from app.exploration.core.copies import copy_row, copy_rows
 from app.exploration.core.geometry import enters, leaves, signed_distance
 from app.exploration.core.routes import Turns, Underway, Vehicles, set_out
-from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_leg, make_nodes
+from app.exploration.survey.value import SurveyObjective, UncertaintyNodes, expected_error, lower_to_leg, make_nodes
 
 DRAWS = 6
 """Random numbers that one change uses."""
@@ -135,7 +135,7 @@ def _reverse(vias: FloatArray, a: int, b: int) -> None:
 def _change(
     plan: ViaPoints,
     starts: FloatArray,
-    nodes: Nodes,
+    nodes: UncertaintyNodes,
     running: FloatArray,
     spread: float,
     r: FloatArray,
@@ -233,7 +233,13 @@ def _under_way(at: FloatArray) -> Underway:
 
 @njit(cache=True, nogil=True)
 def _fly(
-    flights: Flights, v: int, first: int, nodes: Nodes, objective: SurveyObjective, left_m: float, plan: ViaPoints
+    flights: Flights,
+    v: int,
+    first: int,
+    nodes: UncertaintyNodes,
+    objective: SurveyObjective,
+    left_m: float,
+    plan: ViaPoints,
 ) -> None:
     """Fly a vehicle's route anew from its leg ``first`` on."""
     for k in range(first, plan.counts[v]):
@@ -250,7 +256,7 @@ def _try(
     flights: Flights,
     v: int,
     first: int,
-    nodes: Nodes,
+    nodes: UncertaintyNodes,
     objective: SurveyObjective,
     left_m: float,
     plan: ViaPoints,
@@ -276,7 +282,7 @@ def _first_changed(vias: FloatArray, count: int, before: FloatArray, count_befor
 @njit(cache=True, nogil=True)
 def improve(
     d2: FloatArray,
-    nodes: Nodes,
+    nodes: UncertaintyNodes,
     objective: SurveyObjective,
     vehicles: Vehicles,
     begin: ViaPoints,

@@ -19,7 +19,7 @@ from app.exploration.core.routes import Turns, Underway, Vehicles, after_leg, se
 BUCKETS_PER_SIDE = 12
 
 
-class Nodes(NamedTuple):
+class UncertaintyNodes(NamedTuple):
     """Where uncertainty is summed up, sorted by square buckets, so that a leg only asks the nodes around it.
 
     Attributes
@@ -54,7 +54,7 @@ class Nodes(NamedTuple):
         """Positions (m, 2)."""
         return np.column_stack([self.x, self.y])
 
-    def sounded(self, d2: FloatArray) -> "Nodes":
+    def sounded(self, d2: FloatArray) -> "UncertaintyNodes":
         """Return the same nodes for squared distances to soundings that are nowhere larger than ``d2`` (m,)."""
         most2 = np.zeros(len(self.most_m))
         np.maximum.at(most2, np.repeat(np.arange(len(most2)), np.diff(self.first)), d2)
@@ -73,11 +73,11 @@ class SurveyObjective(NamedTuple):
     reach_m: float
 
 
-def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
+def make_nodes(en_m: FloatArray, weight: FloatArray) -> UncertaintyNodes:
     """Sort nodes at ``en_m`` (m, 2) with their ``weight`` (m,) into buckets."""
     if len(en_m) == 0:
         none = np.zeros(0)
-        return Nodes(none, none, none, np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1, np.zeros(1))
+        return UncertaintyNodes(none, none, none, np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1, np.zeros(1))
     low, high = en_m.min(axis=0), en_m.max(axis=0)
     side = max(float((high - low).max()) / BUCKETS_PER_SIDE, 1e-6)
     cols, rows = (int(k) + 1 for k in (high - low) / side)
@@ -87,7 +87,7 @@ def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
     first = np.searchsorted(bucket[order], np.arange(rows * cols + 1)).astype(np.int64)
     x, y, w = (np.ascontiguousarray(v[order], dtype=np.float64) for v in (en_m[:, 0], en_m[:, 1], weight))
     anything = np.full(rows * cols, np.inf)
-    return Nodes(x, y, w, first, float(low[0]), float(low[1]), side, rows, cols, anything)
+    return UncertaintyNodes(x, y, w, first, float(low[0]), float(low[1]), side, rows, cols, anything)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -109,7 +109,9 @@ def _lower(
 
 
 @njit(cache=True, nogil=True)
-def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: float, by: float, reach: float) -> None:
+def lower_to_segment(
+    d2: FloatArray, nodes: UncertaintyNodes, ax: float, ay: float, bx: float, by: float, reach: float
+) -> None:
     """Lower squared distances ``d2`` (m,) of the nodes to those to the segment a-b, in place.
 
     Nodes farther away than ``reach`` may be left as they are.
@@ -145,7 +147,13 @@ def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: flo
 
 @njit(cache=True, nogil=True)
 def lower_to_leg(
-    d2: FloatArray, nodes: Nodes, objective: SurveyObjective, at: Underway, to_x: float, to_y: float, most_m: float
+    d2: FloatArray,
+    nodes: UncertaintyNodes,
+    objective: SurveyObjective,
+    at: Underway,
+    to_x: float,
+    to_y: float,
+    most_m: float,
 ) -> Underway:
     """Lower ``d2`` to what it is after a vehicle's next leg, in place; return the vehicle after it.
 
@@ -161,7 +169,7 @@ def lower_to_leg(
 @njit(cache=True, nogil=True)
 def lower_to_route(
     d2: FloatArray,
-    nodes: Nodes,
+    nodes: UncertaintyNodes,
     objective: SurveyObjective,
     start: FloatArray,
     heading: float,
@@ -201,7 +209,12 @@ def uncertainty(d2: FloatArray, weight: FloatArray, scale_m: float, power: float
 
 @njit(cache=True, nogil=True)
 def plan_value(
-    d2: FloatArray, nodes: Nodes, objective: SurveyObjective, vehicles: Vehicles, vias: FloatArray, counts: IntArray
+    d2: FloatArray,
+    nodes: UncertaintyNodes,
+    objective: SurveyObjective,
+    vehicles: Vehicles,
+    vias: FloatArray,
+    counts: IntArray,
 ) -> float:
     """Return U after flying a plan.
 
@@ -223,7 +236,7 @@ def plan_value(
 @njit(cache=True, nogil=True)
 def values_after_first_leg(
     d2: FloatArray,
-    nodes: Nodes,
+    nodes: UncertaintyNodes,
     objective: SurveyObjective,
     vehicles: Vehicles,
     targets: FloatArray,

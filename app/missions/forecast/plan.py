@@ -113,7 +113,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TeamPlan:
     """The ways of a team, and whether they were found in the time allowed; else they end early."""
 
     ways: list[VehiclePlan]
@@ -136,7 +136,7 @@ def plan(
     floor_depth_m: float | None = None,
     budget_s: float,
     stop: Callable[[], bool] = lambda: False,
-) -> Plan:
+) -> TeamPlan:
     """Return the plan that a mission would begin with.
 
     Parameters
@@ -200,7 +200,7 @@ def plan(
         )
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
-    return Plan(ways, whole, own, depth_m, all_of_it, left_out)
+    return TeamPlan(ways, whole, own, depth_m, all_of_it, left_out)
 
 
 def _planned(

@@ -15,7 +15,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.compilation import Compilation
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.hub import FleetHub
-from app.missions.forecast.plan import SAME_M, Plan, VehiclePlan, plan
+from app.missions.forecast.plan import SAME_M, TeamPlan, VehiclePlan, plan
 from app.missions.forecast.ranges import ForecastRange
 from app.missions.forecast.request import described_team, starts_of
 from app.missions.forecast.whole_survey import WholeSurveyView, whole_view
@@ -111,7 +111,7 @@ class PlanPreviews:
         await self._compilation.planner(spec.planner.name, SingleBeam())
         gone = threading.Event()
 
-        def work() -> tuple[Plan, str]:
+        def work() -> tuple[TeamPlan, str]:
             starts_m, where = starts_of(spec, members)
             stop = partial(any_set, gone, self._closing)
             return plan(spec, members, starts_m, floor_depth_m=floor_depth_m, budget_s=BUDGET_S, stop=stop), where
@@ -130,7 +130,7 @@ def any_set(*events: threading.Event) -> bool:
     return any(event.is_set() for event in events)
 
 
-def _view(spec: MissionSpec, found: Plan, where: str, *, guessed: bool) -> PlanView:
+def _view(spec: MissionSpec, found: TeamPlan, where: str, *, guessed: bool) -> PlanView:
     frame = spec.frame()
     vehicles = [_vehicle(way, frame) for way in found.ways]
     enough = [None if v.energy_left_s is None else v.energy_needs_s <= v.energy_left_s for v in vehicles]
@@ -170,7 +170,7 @@ def _view(spec: MissionSpec, found: Plan, where: str, *, guessed: bool) -> PlanV
     )
 
 
-def _whole(found: Plan) -> WholeSurveyView | None:
+def _whole(found: TeamPlan) -> WholeSurveyView | None:
     """Return what all of a survey takes, by its plan."""
     if found.whole_survey is None:
         return None

@@ -15,7 +15,7 @@ ROW_GROUP = 1024
 
 
 @dataclass(frozen=True)
-class Block:
+class PingBlock:
     """Pings that were judged together, with the number that says in which order."""
 
     number: int
@@ -34,7 +34,7 @@ class Chunk:
     judged: JudgedPings
 
 
-def write_chunk(blocks: Sequence[Block], mission_id: str, vehicle: str) -> bytes:
+def write_chunk(blocks: Sequence[PingBlock], mission_id: str, vehicle: str) -> bytes:
     """Return the file of some blocks, the same whenever it is made of the same."""
     import pyarrow as pa  # slow to import, and needed by those only who have pings
     import pyarrow.parquet as pq

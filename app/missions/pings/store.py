@@ -19,7 +19,7 @@ from app.missions.clock import now
 from app.missions.errors import MissionElsewhereError, PingsUnreadableError
 from app.missions.fleet.interface import PingReport
 from app.missions.large_batches import made_of
-from app.missions.pings.chunk_file import Block, read_chunk, write_chunk
+from app.missions.pings.chunk_file import PingBlock, read_chunk, write_chunk
 from app.missions.pings.codec import JudgedPings, columns_of, joined, pack, unpack
 from app.missions.pings.gate import PingGate, storable
 from app.missions.views.measurements.soundings import ItemVerdict, Verdict
@@ -419,7 +419,7 @@ def _unreadable(error: PingFileError) -> PingsUnreadableError:
 def _chunk_of(rows: Sequence[PingBlockRow]) -> tuple[PingChunkRow, bytes]:
     """Return the file that takes the place of blocks, and what is to be known of it."""
     first = rows[0]
-    blocks = [Block(row.id, row.step, row.received_at, row.source, unpack(row.content)) for row in rows]
+    blocks = [PingBlock(row.id, row.step, row.received_at, row.source, unpack(row.content)) for row in rows]
     content = write_chunk(blocks, first.mission_id, first.vehicle)
     digest = hashlib.sha256(content).hexdigest()
     chunk = PingChunkRow(

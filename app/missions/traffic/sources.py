@@ -31,7 +31,7 @@ Take = Callable[[bytes, "Source"], None]
 log = structlog.get_logger(__name__)
 
 
-class Lines:
+class LineSplitter:
     """Cuts what comes in pieces into lines; a line that does not end is let go."""
 
     def __init__(self) -> None:
@@ -139,7 +139,7 @@ class UdpSource(Source):
     def received(self, data: bytes) -> None:
         """Take a datagram."""
         # Each is whole: a rest without an end of line belongs to no other.
-        self._heard(Lines().cut(data.removeprefix(MULTICAST_HEADER) + b"\n"))
+        self._heard(LineSplitter().cut(data.removeprefix(MULTICAST_HEADER) + b"\n"))
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -189,7 +189,7 @@ class TcpSource(Source):
             raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
         try:
             self._opened()
-            lines = Lines()
+            lines = LineSplitter()
             while True:
                 try:
                     async with asyncio.timeout(SILENT_S):
@@ -229,7 +229,7 @@ class FileSource(Source):
                 os.lseek(opened, 0, os.SEEK_END)
             self._began = True
             self._opened()
-            lines = Lines()
+            lines = LineSplitter()
             while True:
                 piece = await asyncio.to_thread(_read_on, opened)
                 self._heard(lines.cut(piece))

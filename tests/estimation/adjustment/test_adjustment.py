@@ -11,7 +11,7 @@ from scipy import sparse
 
 from app.arrays import FloatArray
 from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
-from app.estimation.adjustment.drift import Nodes
+from app.estimation.adjustment.drift import DriftNodes
 from app.estimation.adjustment.least_squares import LeastSquares, WeighedTies
 from app.estimation.adjustment.ties import Outcome, Tie
 
@@ -255,7 +255,7 @@ def test_a_wrong_heading_or_scale_seen_by_fixes_is_taken_out_of_the_whole_dive(
 @pytest.mark.parametrize("tied", [False, True])
 def test_deviations_are_those_of_each_node_by_itself(tied: bool) -> None:
     soundings, fixes = swaths(hills)
-    nodes = Nodes.along(soundings, fixes, 30.0)
+    nodes = DriftNodes.along(soundings, fixes, 30.0)
     problem = LeastSquares(nodes, fixes, DriftModel())
     ties = WeighedTies.none()
     if tied:

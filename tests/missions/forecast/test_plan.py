@@ -14,7 +14,7 @@ from app.exploration.swath.flown_ahead import seen_from
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.forecast import preview
-from app.missions.forecast.plan import Plan, _flying, _level, plan
+from app.missions.forecast.plan import TeamPlan, _flying, _level, plan
 from app.missions.forecast.request import starts_of
 from app.missions.maps.builder import make_grid
 from app.missions.recovery.failsafes import with_reserve_s
@@ -33,7 +33,7 @@ def members_of(spec: MissionSpec) -> list[Member]:
     return [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
 
 
-def planned(spec: MissionSpec, **how: Any) -> Plan:
+def planned(spec: MissionSpec, **how: Any) -> TeamPlan:
     members = members_of(spec)
     starts, _ = starts_of(spec, members)
     return plan(spec, members, starts, **({"budget_s": AMPLE_S} | how))
@@ -173,7 +173,7 @@ async def test_whoever_leaves_ends_its_plan_and_one_that_waits_never_begins(
     begun: list[str] = []
     ended = threading.Event()
 
-    def endless(spec: MissionSpec, *_: object, stop: Any, **__: object) -> Plan:
+    def endless(spec: MissionSpec, *_: object, stop: Any, **__: object) -> TeamPlan:
         begun.append(spec.name)
         while not stop():
             ended.wait(0.001)

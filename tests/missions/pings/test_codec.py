@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from app.mapping.swath.pings import Pings
-from app.missions.pings.chunk_file import Block, read_chunk, write_chunk
+from app.missions.pings.chunk_file import PingBlock, read_chunk, write_chunk
 from app.missions.pings.codec import PING_COLUMNS, VERSION, JudgedPings, pack, unpack
 from tests.support.missions.pings import same
 
@@ -44,7 +44,7 @@ def test_bytes_hold_all_of_it(pings: JudgedPings) -> None:
 
 @given(st.lists(judged(), min_size=1, max_size=4))
 def test_a_file_holds_all_of_its_blocks(parts: list[JudgedPings]) -> None:
-    blocks = [Block(10 + i, i, AT, "sonar", part) for i, part in enumerate(parts)]
+    blocks = [PingBlock(10 + i, i, AT, "sonar", part) for i, part in enumerate(parts)]
     content = write_chunk(blocks, "m1", "a")
     assert content == write_chunk(blocks, "m1", "a"), "a file that is written again is the same"
     found = read_chunk(content)
@@ -56,7 +56,7 @@ def test_a_file_holds_all_of_its_blocks(parts: list[JudgedPings]) -> None:
 def test_others_can_read_a_file() -> None:
     pings = three_pings()
     pings.angle_rad[1, 2:] = pings.range_m[1, 2:] = np.nan
-    content = write_chunk([Block(1, 5, AT, "sonar", JudgedPings(pings, ("", "far", "")))], "m1", "a")
+    content = write_chunk([PingBlock(1, 5, AT, "sonar", JudgedPings(pings, ("", "far", "")))], "m1", "a")
     table = pq.read_table(pa.BufferReader(content))
     assert table.num_rows == 3
     assert table["range_m"].to_pylist() == [[1.0] * 4, [1.0] * 2, [1.0] * 4]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.missions.settings import AisSettings
-from app.missions.traffic.sources import Lines, UdpSource
+from app.missions.traffic.sources import LineSplitter, UdpSource
 from app.missions.traffic.watch import MOST_PER_TICK, MOST_WAITING, Traffic
 from app.missions.views.traffic import traffic_findings
 from imc_bridge.doctor.diagnosis import Severity
@@ -133,7 +133,7 @@ async def test_a_file_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> Non
 @pytest.mark.parametrize("size", [1, 7, 4096])
 def test_lines_are_put_together_from_pieces_of_any_size(size: int) -> None:
     said = b"\r\n".join([CLASS_A, b"x" * 5000, *STATIC]) + b"\n"
-    lines, found = Lines(), []
+    lines, found = LineSplitter(), []
     for begin in range(0, len(said), size):
         found += lines.cut(said[begin : begin + size])
     assert found[0] == CLASS_A

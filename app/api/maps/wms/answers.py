@@ -8,7 +8,7 @@ import orjson
 from starlette.responses import Response
 
 from app.api.maps.wms.parameters import HTML, PNG, TEXT, MapRequest
-from app.api.maps.wms.sources import Found
+from app.api.maps.wms.sources import FeatureInfo
 from app.missions.operations.maps.map_pictures import MapPicture, MapPictures
 from imc_bridge.printable import printable
 
@@ -35,7 +35,7 @@ def _digest(wanted: MapRequest, found: Sequence[MapPicture]) -> str:
     return hashlib.blake2b(shown.encode(), digest_size=12).hexdigest()
 
 
-def info_answer(media_type: str, found: Sequence[Found], lat_deg: float, lon_deg: float) -> Response:
+def info_answer(media_type: str, found: Sequence[FeatureInfo], lat_deg: float, lon_deg: float) -> Response:
     """Return what is known of a place."""
     if media_type == TEXT:
         content = "\n\n".join(_text(one) for one in found) or "nothing is known here"
@@ -46,7 +46,7 @@ def info_answer(media_type: str, found: Sequence[Found], lat_deg: float, lon_deg
     return Response(content, media_type=media_type, headers=_HEADERS)
 
 
-def _rows(one: Found) -> list[tuple[str, str]]:
+def _rows(one: FeatureInfo) -> list[tuple[str, str]]:
     values = one.values
     soundings = str(values.soundings) if values.soundings else "0 (estimated from those around)"
     return [
@@ -57,11 +57,11 @@ def _rows(one: Found) -> list[tuple[str, str]]:
     ]
 
 
-def _text(one: Found) -> str:
+def _text(one: FeatureInfo) -> str:
     return "\n".join([printable(one.name), *(f"{name}: {value}" for name, value in _rows(one))])
 
 
-def _page(found: Sequence[Found]) -> str:
+def _page(found: Sequence[FeatureInfo]) -> str:
     tables = []
     for one in found:
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(value)}</td></tr>" for name, value in _rows(one))
@@ -70,7 +70,7 @@ def _page(found: Sequence[Found]) -> str:
     return f"<!DOCTYPE html><html>{head}<body>{''.join(tables) or '<p>nothing is known here</p>'}</body></html>"
 
 
-def _collection(found: Sequence[Found], lat_deg: float, lon_deg: float) -> dict[str, object]:
+def _collection(found: Sequence[FeatureInfo], lat_deg: float, lon_deg: float) -> dict[str, object]:
     features = [
         {
             "type": "Feature",

@@ -44,7 +44,7 @@ class _Stored(BaseModel):
 
 
 @dataclass(frozen=True)
-class Found:
+class FeatureInfo:
     """What is known of a place by the map of a mission."""
 
     mission_id: str
@@ -107,7 +107,7 @@ async def _picture(
 
 async def values(
     request: Request, edge: EdgeState, data: Dataset, window: MapWindow, column: int, row: int
-) -> list[Found]:
+) -> list[FeatureInfo]:
     """Return what is known of the place under a pixel, by the newest mission first."""
     lat, lon = window.place(column, row)
     near = _about(data.rows, (lon, lat, lon, lat)) if abs(lat) <= 90.0 and abs(lon) <= 180.0 else []
@@ -117,7 +117,7 @@ async def values(
 
 async def _values(
     request: Request, edge: EdgeState, data: Dataset, row: MissionRow, lat: float, lon: float
-) -> Found | None:
+) -> FeatureInfo | None:
     try:
         peer = await _owner(request, edge, row)
         if peer is not None:
@@ -127,12 +127,12 @@ async def _values(
     except (MissionElsewhereError, MissionNotFoundError, MissionUnreadableError, httpx.HTTPError) as error:
         _leave_out(data, row, error)
         return None
-    return None if values is None else Found(row.id, row.name, values)
+    return None if values is None else FeatureInfo(row.id, row.name, values)
 
 
 async def _values_of_peer(
     request: Request, edge: EdgeState, peer: Peer, row: MissionRow, lat: float, lon: float
-) -> Found | None:
+) -> FeatureInfo | None:
     side = 1e-7
     window = MapWindow(WGS84, lon - side, lat - side, lon + side, lat + side, 1, 1)
     query = {"REQUEST": "GetFeatureInfo", "QUERY_LAYERS": "depth", "INFO_FORMAT": JSON, "I": "0", "J": "0"}
@@ -140,7 +140,7 @@ async def _values_of_peer(
     for feature in orjson.loads(answer.content)["features"]:
         said = feature["properties"]
         values = CellValues(said["depth_m"], said["sd_m"], said["soundings"], said["vertical_datum"])
-        return Found(row.id, row.name, values)
+        return FeatureInfo(row.id, row.name, values)
     return None
 
 

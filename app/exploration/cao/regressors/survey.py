@@ -42,7 +42,13 @@ from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, backbone, packed
 from app.exploration.survey.error import expected_roughness, noise_part, with_second_looks
 from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve
-from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value, values_after_first_leg
+from app.exploration.survey.value import (
+    SurveyObjective,
+    UncertaintyNodes,
+    make_nodes,
+    plan_value,
+    values_after_first_leg,
+)
 
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
 
@@ -544,7 +550,7 @@ def _unless_straight(start_m: FloatArray, via_m: FloatArray, next_m: FloatArray)
     return np.zeros((0, 2)) if straight else via_m[None]
 
 
-def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
+def thin_nodes(team: Situation, variability: FloatArray) -> UncertaintyNodes:
     """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged.
 
     They are moved about a little: on a regular grid a plan would gain by lying on its lines.

@@ -26,7 +26,7 @@ from app.missions.fleet.interface import (
 )
 from app.missions.fleet.links.visiting import VisitedLink, Visitor
 from imc_bridge.control.plans import leg_time_s
-from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, Step, moved_m, reach_m
+from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, PositionVerdict, moved_m, reach_m
 from imc_bridge.telemetry.soundings import StateSample
 
 KEPT_S = 86_400.0
@@ -179,7 +179,7 @@ class RestFleetLink(VisitedLink):
         """
         places = self._places.setdefault(report.vehicle, PlausiblePlace())
         sample = self._sample(report)
-        if places.take(sample) is not Step.DOUBTFUL or (last := places.last) is None:
+        if places.take(sample) is not PositionVerdict.DOUBTFUL or (last := places.last) is None:
             return ""
         poller = self._touch(report.vehicle)
         if poller.doubtful_since_s is None:

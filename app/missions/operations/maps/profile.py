@@ -10,7 +10,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import MAX_EXTENT_M
 from app.mapping.layers import Layer
-from app.mapping.profile import Line, Profile, beside, layer_along, line_through, profile_along
+from app.mapping.profile import Profile, ProfileLine, beside, layer_along, line_through, profile_along
 from app.missions.errors import InvalidRequestError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.snapshot import MapSnapshot
@@ -73,7 +73,7 @@ async def profile_of(
     return await asyncio.to_thread(view)
 
 
-def _line(snapshot: MapSnapshot, asked: ProfileRequest) -> Line:
+def _line(snapshot: MapSnapshot, asked: ProfileRequest) -> ProfileLine:
     lon_deg, lat_deg = np.array(asked.line, dtype=float).T
     try:
         corners_m = np.column_stack(snapshot.facts.frame.to_local(lat_deg, lon_deg))
@@ -98,7 +98,7 @@ def _line(snapshot: MapSnapshot, asked: ProfileRequest) -> Line:
     return line_through(corners_m, spacing_m)
 
 
-async def _soundings_near(live: LiveMission, line: Line, within_m: float) -> tuple[FloatArray, int]:
+async def _soundings_near(live: LiveMission, line: ProfileLine, within_m: float) -> tuple[FloatArray, int]:
     """Return soundings as rows (along, across, depth, deviation), and how many there are altogether."""
     await live.journal.flush()
     low, high = line.corners_m.min(axis=0) - within_m, line.corners_m.max(axis=0) + within_m
@@ -122,7 +122,7 @@ async def _soundings_near(live: LiveMission, line: Line, within_m: float) -> tup
 
 def _view(
     snapshot: MapSnapshot,
-    line: Line,
+    line: ProfileLine,
     profile: Profile,
     layers: Sequence[Layer],
     within_m: float,
