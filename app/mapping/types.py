@@ -9,6 +9,9 @@ from app.arrays import BoolArray, FloatArray, IntArray
 SoundingRows = FloatArray
 """Soundings as rows, shape (n, 4): east, north, depth, standard deviation in metres."""
 
+MAX_SD_M = 1000.0
+"""A standard deviation beyond this says nothing true, and a map cannot be computed with it."""
+
 CHARTED_SD = "one standard deviation of the depth, that of what all soundings share, such as the tide, included"
 """What the deviations of :meth:`BathymetricMap.charted` are, as files say it."""
 

@@ -10,6 +10,7 @@ from imc_bridge.control.plans import (
     OPERATION_START,
     PLAN_CONTROL_FAILURE,
     PLAN_CONTROL_SUCCESS,
+    START_RETRY_S,
     plan_control,
 )
 from imc_bridge.control.references import SentReference
@@ -19,7 +20,6 @@ from imc_bridge.network.text_fields import text
 from imc_bridge.nodes.modes import PlanState
 from imc_bridge.nodes.node import NO_POSITION
 
-START_RETRY_S = 2.0
 BLOCKED_S = 1.0
 """A plan that is blocked for longer, while its maneuver goes on, is started again."""
 STARVED_S = 4.0

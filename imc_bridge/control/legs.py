@@ -21,6 +21,7 @@ from imc_bridge.control.plans import (
     OPERATION_STOP,
     PLAN_CONTROL_FAILURE,
     PLAN_CONTROL_SUCCESS,
+    START_RETRY_S,
     descent_m,
     goto_maneuver,
     leg_plan,
@@ -44,7 +45,6 @@ RADIO_SILENT_WALL_S = 0.5
 SOUND_START_TIMEOUT_S = 90.0
 START_TIMEOUT_WALLS = 3.0
 """In units of the silence on the wall clock that is never a loss, however fast the vehicles live."""
-START_RETRY_S = 2.0
 REPORT_KEEPS_S = 90.0
 """A vehicle that reported by sound is expected for at least this much longer."""
 HEARD_LATELY_S = 2.0

@@ -25,6 +25,9 @@ PLAN_CONTROL_FAILURE = 2
 OPERATION_START = 0
 OPERATION_STOP = 1
 
+START_RETRY_S = 2.0
+"""A start that is not answered is asked for again after so long."""
+
 SLOWEST_SHARE = 0.6
 """A leg may take as long as at this share of the speed asked for."""
 CLIMB_MPS = 0.15

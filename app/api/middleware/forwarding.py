@@ -17,6 +17,7 @@ from websockets.typing import Subprotocol
 from app.api.access.auth import authenticate, until_unwelcome
 from app.api.accounts.processes import Deliveries, comes_from_peer, end_to_end, recognise, target_without_token, tls_of
 from app.api.bodies.admission import READING
+from app.api.http import close_codes
 from app.api.http.first_completed import first_of
 from app.api.http.problems import ProblemError, instance_of, make_problem, problem_response
 from app.api.http.spool import Spool, spool_folder
@@ -33,8 +34,6 @@ RETRY_S = 0.2
 
 MISDIRECTED = 421
 """What a process answers that does not have the mission (any more)."""
-CLOSE_TRY_AGAIN = 1013
-CLOSE_UNWELCOME = 4401
 NO_CODE = (1005, 1006)
 """Codes of a WebSocket's end that may not be sent."""
 
@@ -207,7 +206,7 @@ async def _until_left(receive: Receive) -> None:
 async def _misdirect(scope: Scope, receive: Receive, send: Send, detail: str) -> None:
     """Say that this process is not the one that is meant."""
     if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": CLOSE_TRY_AGAIN, "reason": detail})
+        await send({"type": "websocket.close", "code": close_codes.TRY_AGAIN, "reason": detail})
         return
     answer = problem_response(make_problem("mission-elsewhere", detail, instance=instance_of(scope)))
     answer.status_code = MISDIRECTED
@@ -248,16 +247,18 @@ async def _send_view_on(edge: EdgeState, peer: Peer, scope: Scope, receive: Rece
                 edge.stopping.wait(),
                 until_unwelcome(HTTPConnection(scope), edge),
             )
-            code = upstream.close_code or CLOSE_TRY_AGAIN
+            code = upstream.close_code or close_codes.TRY_AGAIN
             reason = upstream.close_reason or ""
             if ended == 3:
-                code, reason = CLOSE_UNWELCOME, "the access token is not valid any more"
+                code, reason = close_codes.UNAUTHENTICATED, "the access token is not valid any more"
     except (OSError, TimeoutError, InvalidHandshake) as error:
         log.warning("live view cannot be had from another process", url=peer.url, error=str(error))
         await send({"type": "websocket.accept"})
-        code, reason = CLOSE_TRY_AGAIN, "the process that has the mission does not answer: reconnect"
+        code, reason = close_codes.TRY_AGAIN, "the process that has the mission does not answer: reconnect"
     with contextlib.suppress(RuntimeError, OSError):
-        await send({"type": "websocket.close", "code": CLOSE_TRY_AGAIN if code in NO_CODE else code, "reason": reason})
+        await send(
+            {"type": "websocket.close", "code": close_codes.TRY_AGAIN if code in NO_CODE else code, "reason": reason}
+        )
 
 
 async def _pump_down(upstream: ClientConnection, send: Send) -> None:

@@ -16,6 +16,7 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.types import Receive, Scope, Send
 
 from app.api.access.auth import Reader, authenticate, until_unwelcome
+from app.api.http import close_codes
 from app.api.http.first_completed import first_of
 from app.api.http.problems import ProblemError, problems
 from app.api.mission import Mission
@@ -35,13 +36,6 @@ PAGE = 500
 KEEP_ALIVE_S = 15
 KEPT_TEXTS = 64
 RECONNECT_MS = 2000
-
-CLOSE_UNAUTHENTICATED = 4401
-CLOSE_FORBIDDEN = 4403
-CLOSE_NOT_FOUND = 4404
-CLOSE_TOO_MANY = 4429
-CLOSE_TRY_AGAIN = 1013
-CLOSE_GOING_AWAY = 1001
 
 log = structlog.get_logger(__name__)
 
@@ -215,23 +209,23 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
             await _serve(websocket, state, mission_id)
     except ProblemError as error:
         codes = {
-            "unauthenticated": CLOSE_UNAUTHENTICATED,
-            "forbidden": CLOSE_FORBIDDEN,
-            "too-many-streams": CLOSE_TOO_MANY,
+            "unauthenticated": close_codes.UNAUTHENTICATED,
+            "forbidden": close_codes.FORBIDDEN,
+            "too-many-streams": close_codes.TOO_MANY,
         }
         await _close(websocket, codes[error.kind], error.detail)
     except (MissionElsewhereError, NotAMemberError) as error:
-        await _close(websocket, CLOSE_TRY_AGAIN, str(error))
+        await _close(websocket, close_codes.TRY_AGAIN, str(error))
     except MissionError as error:
-        await _close(websocket, CLOSE_NOT_FOUND, str(error))
+        await _close(websocket, close_codes.NOT_FOUND, str(error))
     except WatchEndedError as error:
-        await _close(websocket, CLOSE_TRY_AGAIN, f"{error}: reconnect")
+        await _close(websocket, close_codes.TRY_AGAIN, f"{error}: reconnect")
     except (SQLAlchemyError, sqlite3.Error) as error:
         trouble = trouble_of(error)
         if not trouble:
             raise
         log.warning("a live view ended", mission=mission_id, why=trouble)
-        await _close(websocket, CLOSE_TRY_AGAIN, trouble)
+        await _close(websocket, close_codes.TRY_AGAIN, trouble)
     except WebSocketDisconnect:
         pass
 
@@ -247,9 +241,9 @@ async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> Non
             until_unwelcome(websocket, state),
         )
         if ended == 2:
-            await _close(websocket, CLOSE_GOING_AWAY, "the service ends")
+            await _close(websocket, close_codes.GOING_AWAY, "the service ends")
         if ended == 3:
-            await _close(websocket, CLOSE_UNAUTHENTICATED, "the access token or the session has ended")
+            await _close(websocket, close_codes.UNAUTHENTICATED, "the access token or the session has ended")
 
 
 async def _send_all(websocket: WebSocket, messages: AsyncIterator[LiveMessage]) -> None:

@@ -14,10 +14,10 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.estimation import SingleBeam
-from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, LEAST_SD_M
+from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, FEWER_LINES, LEAST_SD_M, TICK_S
 from app.evaluation.survey.world import SPEED_MPS, Log, MapSoFar, SurveyScenario
 from app.exploration.core.problem import Belief, Planner, Situation
-from app.exploration.motion.leg_rules import AHEAD, HARDLY_BEGUN, TURN_S
+from app.exploration.motion.leg_rules import AHEAD, HARDLY_BEGUN, LEAST_WAY_M, TURN_S
 from app.exploration.motion.on_leg import Place, along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
@@ -26,16 +26,11 @@ from simulator.equipment import Equipment
 from simulator.sonars.sensors import SonarNoise
 from simulator.world import SimulatedVehicle
 
-TICK_S = 0.2
 DECISION_S = 0.5
 """What a decision takes."""
-LEAST_WAY_M = 1.0
-"""Who has less way left gets no leg."""
 LEAD_M = 4.0
 """A vehicle keeps the leg after the one that it flies where it begins it within so many metres."""
 PASSED_WITHIN_M = 8.0
-FEWER_LINES = 0.97
-"""Each try to find lines that can be finished plans with at most this share of the way of the one before."""
 TRIES = 15
 
 

@@ -16,7 +16,7 @@ ARRIVAL_RADIUS_M = 3.0
 """A corner counts as reached within this distance, as in missions."""
 TICK_S = 0.2
 FEWER_LINES = 0.97
-"""Each try to find lines that can be finished plans with this share of the distance of the one before."""
+"""Each try to find lines that can be finished plans with at most this share of the way of the one before."""
 TRIES = 12
 LEAST_SD_M = 1e-3
 

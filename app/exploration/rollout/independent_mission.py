@@ -34,19 +34,11 @@ from app.exploration.rollout.independent_routes import (
     trace,
 )
 from app.exploration.rollout.local_search import DRAWS
+from app.exploration.rollout.plan_settings import BUCKETS, HEIGHT, PARTS, SAMPLE, SAMPLE_GRID
 from app.exploration.rollout.points import LandmarkPoints, make_points
 from app.exploration.rollout.sectors import sectors
 
 ROOM = 48
-SAMPLE, SAMPLE_GRID = 400, 20
-"""Landmarks that plans are judged by, and cells per side of the area that they are taken from."""
-
-BUCKETS = 3
-"""Buckets of landmarks per visibility."""
-
-HEIGHT = 0.45
-"""Height above the floor to fly at, in visibilities, where vehicles may come that low."""
-
 WORTH = 2.0
 """Steps that a change must save: what is found on one guess of all that is unknown does not hold on the next."""
 
@@ -56,9 +48,6 @@ FIRST_SEARCH = 1000
 LOWER = 0.25
 """How far below what the estimate of the floor allows vehicles are sent where their altimeters hold the clearance
 anyway, in visibilities."""
-
-PARTS = (1.0, 0.8, 0.5, 0.2)
-"""Parts of a step to try when the whole one is not feasible."""
 
 AHEAD = 0.05
 """Part of a step below which a shorter one leads nowhere."""

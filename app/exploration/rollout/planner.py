@@ -45,13 +45,11 @@ from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.independent_routes import stops_of
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
+from app.exploration.rollout.plan_settings import BUCKETS, HEIGHT, PARTS, SAMPLE, SAMPLE_GRID
 from app.exploration.rollout.tour import tour_of
 from app.exploration.rollout.unseen import SLACK, deeper_than_presumed, look_in_vain
 
 ROOM = 40
-HEIGHT = 0.45
-"""Flying height of first plans, in visibilities."""
-
 FIRST_SINKING = 0.3
 """Part of a step by which vehicles may sink in first plans."""
 
@@ -60,9 +58,6 @@ TOUR_SINKING, TOUR_HEIGHT = 0.6, 0.35
 
 HEDGE = 1.5
 """How much more information a landmark is presumed to need that was never seen, because its depth is a guess."""
-
-PARTS = (1.0, 0.8, 0.5, 0.2)
-"""Parts of a step to try when the whole one is not feasible."""
 
 CONVOY_MARGIN = 2.5
 """Distance that a team on its way between zones keeps from them, in cells of the free space."""
@@ -78,12 +73,6 @@ FEW_LEFT = 0.08
 LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
-
-SAMPLE, SAMPLE_GRID = 400, 20
-"""Tasks that plans are judged by where whole positions are estimated, and cells per side that they are taken from."""
-
-BUCKETS = 3
-"""Buckets of landmarks per visibility."""
 
 SWATH_EXCESS = 1.2
 """How far a team may exceed, on average, the landmarks in the swath that it sees."""

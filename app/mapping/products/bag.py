@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import RasterioError
 
+from app.mapping.bag_values import NODATA
 from app.mapping.coordinates.projected import Frame
 from app.mapping.products.geotiff import north_up_transform
 from app.mapping.types import CHARTED_SD, BathymetricMap
 from app.mapping.water.vertical import VerticalDatum
 
-NODATA = 1_000_000.0
-"""What the format prescribes for cells without a value."""
 NOT_WHOLE = "it cannot be written whole; is the disk that TMPDIR points to full?"
 
 

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.arrays import BoolArray, IntArray
+from app.mapping.bag_values import NODATA, NOT_REFINED
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.products.bag import NODATA, bag
+from app.mapping.products.bag import bag
 from app.mapping.tiers import coarsened, doublings
 from app.mapping.types import BathymetricMap
 from app.mapping.water.vertical import VerticalDatum
@@ -16,7 +17,6 @@ from app.mapping.water.vertical import VerticalDatum
 REFINED_CELLS = 32
 """Finest cells along a side of a coarse one, which is refined as a whole, unless the deepest tier asks for more."""
 
-NOT_REFINED = 0xFFFFFFFF
 REFINEMENT = np.dtype(
     [
         ("index", "<u4"),

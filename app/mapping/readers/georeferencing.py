@@ -18,7 +18,6 @@ from app.mapping.readers.types import (
     DATUM_NOTE,
     LOCAL,
     MAX_DEPTH_M,
-    MAX_SD_M,
     MAX_SOUNDINGS,
     MIN_DEPTH_M,
     MIN_SD_M,
@@ -30,7 +29,7 @@ from app.mapping.readers.types import (
     ReadOptions,
 )
 from app.mapping.s44 import NORMAL_95, Order, max_tvu_m
-from app.mapping.types import Grid, Soundings
+from app.mapping.types import MAX_SD_M, Grid, Soundings
 from app.mapping.water.vertical import datum_words, same_datum, vertical_part, vertical_unit
 
 SAME_UNIT = 1e-4

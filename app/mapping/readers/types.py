@@ -24,7 +24,7 @@ LOCAL: Literal["local"] = "local"
 """Stands for the mission's own frame where a coordinate reference system is asked for."""
 
 MIN_DEPTH_M, MAX_DEPTH_M = -100.0, 11_100.0
-MIN_SD_M, MAX_SD_M = 0.001, 1000.0
+MIN_SD_M = 0.001
 
 DATUM_NOTE = "vertical datum: "
 """How a note begins that depths may be off by the difference of two datums."""

@@ -9,11 +9,10 @@ import pyproj
 from affine import Affine
 
 from app.arrays import FloatArray
+from app.mapping.bag_values import NODATA, NOT_REFINED
 from app.mapping.readers.types import MAX_RASTER_CELLS, Points, ReadError
 
 METADATA, NODES = "BAG_root/varres_metadata", "BAG_root/varres_refinements"
-NOT_REFINED = 0xFFFFFFFF
-NODATA = 1_000_000.0
 
 _UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import shapely
 from shapely.geometry import Polygon
 
+from app.mapping.types import MAX_SD_M
 from app.missions.fleet.interface import SoundingReport
 from app.missions.soundings.corrections import Corrections, PlacedSounding, no_tracks
 
@@ -15,8 +16,7 @@ MAX_VEHICLE_SPEED_MPS = 6.0
 """Faster than any survey AUV; a faster move between two soundings is a jump of the navigation."""
 
 MIN_SD_M = 1e-4
-MAX_SD_M = 1000.0
-"""Standard deviations beyond these say nothing true, and a map cannot be computed with them."""
+"""A standard deviation below this says nothing true, and a map cannot be computed with it."""
 
 JUMP_ALLOWANCE_M = 10.0
 """A GPS fix at the surface may correct the position by this much at once."""

@@ -5,14 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.arrays import FloatArray
+from app.exploration.motion.leg_rules import LEAST_WAY_M
 from app.missions.spec.mission import MissionSpec
 
 RESERVE = 0.06
 """Share of the remaining steps that a planner is not told of: vehicles turn in circles and pass waypoints at the side,
 so a plan that needs every step would end with its last line half flown. What is not used is released bit by bit."""
-
-LEAST_WAY_M = 1.0
-"""A vehicle with less way left is done, and where a mission lasts so many minutes one with less than it arrives in."""
 
 STILL_M = 0.5
 """Who goes no farther holds its place, which takes as much of its way as the longest leg: it flies circles there."""

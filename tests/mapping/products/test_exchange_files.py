@@ -20,9 +20,10 @@ import pytest
 import rasterio
 from compliance_checker.runner import CheckSuite, ComplianceChecker
 
+from app.mapping.bag_values import NODATA
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import LayerSource, file_layers
-from app.mapping.products.bag import NODATA, bag
+from app.mapping.products.bag import bag
 from app.mapping.products.contours import find_contours
 from app.mapping.products.crowdsourced import CrowdsourcedFile, Provider, RawSounding
 from app.mapping.products.kml import contours_kml, tracks_kml

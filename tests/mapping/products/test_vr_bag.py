@@ -10,8 +10,8 @@ import pytest
 import rasterio
 
 from app.arrays import FloatArray
+from app.mapping.bag_values import NODATA
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.products.bag import NODATA
 from app.mapping.products.vr_bag import REFINED_CELLS, vr_bag
 from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings

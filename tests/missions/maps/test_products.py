@@ -16,8 +16,8 @@ import rasterio
 from rasterio.io import DatasetReader, MemoryFile
 from rasterio.transform import rowcol
 
+from app.mapping.bag_values import NODATA
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.products.bag import NODATA
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map, without_guesses
 from app.mapping.types import Grid

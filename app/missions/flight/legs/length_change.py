@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from app.exploration.motion.leg_rules import LEAST_WAY_M
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.live.mission import LiveMission
-from app.missions.task.way import LEAST_WAY_M, way_m
+from app.missions.task.way import way_m
 from app.missions.team import Member
 
 

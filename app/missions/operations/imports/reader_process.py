@@ -23,7 +23,6 @@ from app.mapping.readers.types import (
     MAX_DEPTH_M,
     MAX_DRAWINGS,
     MAX_DRAWN_CORNERS,
-    MAX_SD_M,
     MAX_SOUNDINGS,
     MAX_ZONES,
     MIN_DEPTH_M,
@@ -32,6 +31,7 @@ from app.mapping.readers.types import (
     MapExtent,
     ReadOptions,
 )
+from app.mapping.types import MAX_SD_M
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
 from app.missions.operations.imports.uploads import Upload
 from app.missions.spec.base import SHOWN_PATTERN
