@@ -16,7 +16,7 @@ from app.evaluation.generalize.trial import Recorder, Trial, rounded, thinned
 from app.evaluation.pcao.simulation.task import TrainingTask
 from app.evaluation.pcao.simulation.world import SeaFloor
 from app.evaluation.search.run import HOME_M
-from app.evaluation.search.world import RescueScenario, explored_pct, fully_explored, run_search
+from app.evaluation.search.world import SearchScenario, explored_pct, fully_explored, run_search
 from app.evaluation.survey.run import best_even_survey, even_coverage, fly_pattern, judge
 from app.evaluation.survey.world import SurveyScenario, fly_planner
 from app.evaluation.track.run import run_track
@@ -88,7 +88,7 @@ def search(floor: Terrain, seed: int, size: Size) -> Trial:
     """Part of the goal area that is not explored when the time is up, in %, beside what the paper's CAO leaves."""
     world = site_of(floor)
     window_m = 1500.0 if size == "full" else 40.0
-    scenario = RescueScenario(world, goal_radius_m=50.0, window_m=window_m, seed=seed)
+    scenario = SearchScenario(world, goal_radius_m=50.0, window_m=window_m, seed=seed)
     flown = run_search(scenario, "rollout", PlannerOptions())
     north, east = (np.indices(world.solid.shape) + 0.5) * world.cell_m
     goal = np.hypot(east - world.goal_m[0], north - world.goal_m[1]) <= scenario.goal_radius_m

@@ -20,9 +20,9 @@ from app.evaluation.runs.command import (
     planners_named,
     seed_list,
 )
-from app.evaluation.search.report import VARIANTS, report_jobs, rescue_report
-from app.evaluation.search.run import RescueJob
-from app.evaluation.search.world import RescueScenario
+from app.evaluation.search.report import VARIANTS, report_jobs, search_report
+from app.evaluation.search.run import SearchJob
+from app.evaluation.search.world import SearchScenario
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import SEARCHERS
 from simulator.obstacles.car_parks import SCENARIOS, car_park, harbour_basin
@@ -35,8 +35,8 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@evaluate_app.command()
-def rescue(
+@evaluate_app.command("rescue")
+def search(
     context: typer.Context,
     scenario: Annotated[str, typer.Option(help="Car park 1, 2 or 3, or harbour.")] = "1",
     rc: Annotated[float, typer.Option(min=1.0, help="Radius of the goal area in metres.")] = 50.0,
@@ -73,8 +73,8 @@ def rescue(
         _report(write, chosen, seeds or str(chosen[0]), jobs, scheduler, only, no_run=no_run)
         return
     runs = [
-        RescueJob(
-            RescueScenario(
+        SearchJob(
+            SearchScenario(
                 _world(scenario, which), rc, window, robots, clock="steps" if clock == "steps" else "way", seed=which
             ),
             name,
@@ -117,5 +117,5 @@ def _report(
             bar.advance(task)
     command = f"bathyfleet evaluate rescue --write FOLDER --seeds {said} --jobs {jobs}"
     facts = made(command + (f" --only {only}" if only else ""), jobs)
-    (out / "rescue.md").write_text(rescue_report(list(results.runs.values()), facts), encoding="utf-8")
+    (out / "rescue.md").write_text(search_report(list(results.runs.values()), facts), encoding="utf-8")
     typer.echo(f"{out / 'rescue.md'}: {len(open_)} runs made, {len(results.runs)} kept", err=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.evaluation.runs.summary import spread
-from app.evaluation.search.run import RescueJob
-from app.evaluation.search.world import RescueScenario
+from app.evaluation.search.run import SearchJob
+from app.evaluation.search.world import SearchScenario
 from app.exploration.planner.options import PlannerOptions
 from simulator.obstacles.car_parks import SCENARIOS, car_park
 
@@ -47,11 +47,11 @@ PUBLISHED = {
 """Goal area and map in %, of CAO, random and SPSA (tables I to III)."""
 
 
-def report_jobs(names: Sequence[str], seeds: Sequence[int]) -> list[RescueJob]:
+def report_jobs(names: Sequence[str], seeds: Sequence[int]) -> list[SearchJob]:
     """Return the runs of some variants, seed by seed, so that an interrupted report has all rows."""
     return [
-        RescueJob(
-            RescueScenario(
+        SearchJob(
+            SearchScenario(
                 car_park(scenario, seed), radius, WINDOW, VARIANTS[name].robots, seed=seed,
                 clock="steps" if VARIANTS[name].clock == "steps" else "way",
             ),
@@ -65,7 +65,7 @@ def report_jobs(names: Sequence[str], seeds: Sequence[int]) -> list[RescueJob]:
     ]  # fmt: skip
 
 
-def rescue_report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
+def search_report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
     """Return the report in Markdown."""
     lines = ["# Search and rescue: ACCESS13's car parks", ""]
     lines += [f"- {name}: {value}" for name, value in facts.items()]

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.estimation import Sensor
 from app.evaluation.runs.jobs import Progress
-from app.evaluation.search.world import RescueScenario, explored_pct, fully_explored, run_search
+from app.evaluation.search.world import SearchScenario, explored_pct, fully_explored, run_search
 from app.exploration.planner.options import PlannerOptions
 
 TRAPPED_M, LEFT_PCT = 200.0, 5.0
@@ -19,7 +19,7 @@ HOME_M = 3.0
 
 
 @dataclass(frozen=True)
-class RescueRun:
+class SearchRun:
     """One run; names as in the command's JSON.
 
     ``goal_area_pct`` and ``map_pct``: explored part of all free cells that a robot could see from anywhere it can get
@@ -52,10 +52,10 @@ class RescueRun:
 
 
 @dataclass(frozen=True)
-class RescueJob:
-    """One run of ``rescue``; ``key`` distinguishes it in a report."""
+class SearchJob:
+    """One run of ``bathyfleet evaluate rescue``; ``key`` distinguishes it in a report."""
 
-    scenario: RescueScenario
+    scenario: SearchScenario
     planner: str
     options: PlannerOptions
 
@@ -83,12 +83,12 @@ class RescueJob:
 
     def run(self, progress: Progress) -> dict[str, Any]:
         """Run it."""
-        return {"key": self.key, **asdict(run_rescue(self.scenario, self.planner, self.options, progress))}
+        return {"key": self.key, **asdict(run_and_judge(self.scenario, self.planner, self.options, progress))}
 
 
-def run_rescue(
-    scenario: RescueScenario, planner: str, options: PlannerOptions, progress: Progress = lambda step: None
-) -> RescueRun:
+def run_and_judge(
+    scenario: SearchScenario, planner: str, options: PlannerOptions, progress: Progress = lambda step: None
+) -> SearchRun:
     """Run a search and judge it by the truth."""
     track = run_search(scenario, planner, options, progress)
     world = scenario.world
@@ -100,7 +100,7 @@ def run_rescue(
     later = slice(1, None) if len(track.plan_s) > 1 else slice(None)
     plan_ms, plan_cpu_ms = 1e3 * track.plan_s[later], 1e3 * track.plan_cpu_s[later]
     seen = explored_pct(track.grid, whole)
-    return RescueRun(
+    return SearchRun(
         planner=planner,
         scenario=world.name,
         rc=scenario.goal_radius_m,

@@ -27,7 +27,7 @@ CHECK_M = 0.05
 
 
 @dataclass(frozen=True)
-class RescueScenario:
+class SearchScenario:
     """A search in a world of obstacles.
 
     Attributes
@@ -83,7 +83,7 @@ class RescueScenario:
 
 
 @dataclass(frozen=True)
-class RescueTrack:
+class SearchTrack:
     """A search that was run.
 
     Attributes
@@ -119,11 +119,11 @@ class RescueTrack:
 
 
 def run_search(
-    scenario: RescueScenario,
+    scenario: SearchScenario,
     planner: str,
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
-) -> RescueTrack:
+) -> SearchTrack:
     """Run the closed loop until all robots are home for good or the time is up."""
     world, scanner = scenario.world, scenario.scanner
     chooser = create_planner(planner, options, scanner)
@@ -174,13 +174,13 @@ def run_search(
         progress(step)
         if left <= 0.0 or (gone == 0.0 and home and proposal.terms["homebound"]):
             break
-    return RescueTrack(
+    return SearchTrack(
         np.array(history), np.array(explored), np.array(goal), np.array(lefts), grid, collisions, too_close, longest,
         standstill, np.array(times), np.array(computed),
     )  # fmt: skip
 
 
-def fully_explored(scenario: RescueScenario) -> NDArray[np.bool_]:
+def fully_explored(scenario: SearchScenario) -> NDArray[np.bool_]:
     """Return the free cells (rows, cols) that can be seen from anywhere a robot can get to.
 
     The paper compares with "the fully explored map". A gap between parked cars may be out of sight of every robot.
@@ -202,7 +202,7 @@ def explored_pct(grid: OccupancyGrid, all_: NDArray[np.bool_]) -> float:
     return 100.0 * float(np.count_nonzero(all_ & (grid.states == Cell.EXPLORED))) / max(1, int(np.count_nonzero(all_)))
 
 
-def _task(scenario: RescueScenario, grid: OccupancyGrid, left_m: float) -> SearchTask:
+def _task(scenario: SearchScenario, grid: OccupancyGrid, left_m: float) -> SearchTask:
     world = scenario.world
     return SearchTask(
         grid, scenario.scanner, world.goal_m, scenario.goal_radius_m, world.entry_m, world.transmitter_m,
@@ -216,7 +216,7 @@ def _along(start: FloatArray, end: FloatArray, every_m: float) -> FloatArray:
     return start + (np.arange(1, n + 1) / n)[:, None] * (end - start)
 
 
-def _scanned(grid: OccupancyGrid, scenario: RescueScenario, position: FloatArray) -> OccupancyGrid:
+def _scanned(grid: OccupancyGrid, scenario: SearchScenario, position: FloatArray) -> OccupancyGrid:
     bearings = scenario.scanner.bearings_rad
     ranges = scenario.world.scan(position, bearings, scenario.scanner.reach_m)
     return grid.seen_from(position, bearings, ranges, scenario.scanner.reach_m)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.estimation import Scanner
-from app.evaluation.search.world import RescueScenario, explored_pct, fully_explored, run_search
+from app.evaluation.search.world import SearchScenario, explored_pct, fully_explored, run_search
 from app.exploration.planner.options import PlannerOptions
 from simulator.obstacles.obstacles import ObstacleWorld
 
@@ -20,7 +20,7 @@ def wall_across_the_goal_area() -> ObstacleWorld:
 @pytest.mark.slow
 @pytest.mark.parametrize("robots", [1, 2])
 def test_what_lies_behind_a_long_way_round_is_looked_at_before_the_rest_of_the_site(robots: int) -> None:
-    scenario = RescueScenario(wall_across_the_goal_area(), 20.0, 420.0, robots, scanner=Scanner(8.0, 1.0))
+    scenario = SearchScenario(wall_across_the_goal_area(), 20.0, 420.0, robots, scanner=Scanner(8.0, 1.0))
     flown = run_search(scenario, "rollout", PlannerOptions())
     north, east = np.indices(scenario.world.solid.shape) + 0.5
     goal = np.hypot(east - scenario.world.goal_m[0], north - scenario.world.goal_m[1]) <= scenario.goal_radius_m
