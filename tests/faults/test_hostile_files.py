@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from app.mapping.readers.files import read_file
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.types import ReadError
 from app.missions.views.measurements.imports import ImportOptions
 from simulator.floors.terrain import Terrain, TerrainError

@@ -12,8 +12,8 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.routes import Turns, Vehicles
-from app.exploration.lines.dealing import LinePath, dealt, path_over, way_m
 from app.exploration.lines.lattice import Sweep, even_lines, most_lines
+from app.exploration.lines.line_shares import LinePath, dealt, path_over, way_m
 
 MOST_ORDERS = 3
 """Teams up to this size are dealt the lines in every order."""

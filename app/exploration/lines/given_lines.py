@@ -14,10 +14,10 @@ from app.arrays import FloatArray, IntArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.routes import SAME_M, Turns, Vehicles
-from app.exploration.lines.dealing import PARTS, WHOLE_LINES, LinePath, dealt, least_share, path_over, way_m
 from app.exploration.lines.even_survey import MOST_ORDERS
 from app.exploration.lines.flying_order import flying_orders
 from app.exploration.lines.lattice import LEAST_LINE_M
+from app.exploration.lines.line_shares import PARTS, WHOLE_LINES, LinePath, dealt, least_share, path_over, way_m
 from app.exploration.lines.parts import parts_of
 
 DETAIL_M = 0.25

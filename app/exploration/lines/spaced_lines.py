@@ -9,9 +9,9 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.routes import Turns, Vehicles
-from app.exploration.lines.dealing import PARTS, WHOLE_LINES, least_share
 from app.exploration.lines.even_survey import EvenSurvey, Pattern, survey_of
 from app.exploration.lines.lattice import MAX_LINES, Sweep, axes_of, even_lines, route_length
+from app.exploration.lines.line_shares import PARTS, WHOLE_LINES, least_share
 from app.exploration.lines.parts import parts_of
 
 SPARE = 0.05

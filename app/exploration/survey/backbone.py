@@ -10,9 +10,9 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.free_space import FreeSpace
 from app.exploration.core.routes import Vehicles
-from app.exploration.lines.dealing import way_m
 from app.exploration.lines.even_survey import Pattern, even_survey, orders_across
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
+from app.exploration.lines.line_shares import way_m
 from app.exploration.lines.parts import parts_of
 from app.exploration.survey.value import SurveyObjective, UncertaintyNodes, make_nodes, plan_value
 

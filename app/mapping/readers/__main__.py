@@ -22,7 +22,7 @@ def main(layers: tuple[str, ...] = LAYERS) -> int:
     # pyogrio would load it, and it starts threads.
     sys.modules["pyarrow"] = None  # type: ignore[assignment]
     # Everything is imported and used once before the file is looked at: afterwards nothing more can be loaded.
-    from app.mapping.readers.reading import place_file
+    from app.mapping.readers.placed_file import place_file
     from app.mapping.readers.warm_up import data_folders, warm_up
 
     warm_up(task)

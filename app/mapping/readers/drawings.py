@@ -22,7 +22,7 @@ from pyproj.exceptions import CRSError, ProjError
 
 from app.arrays import FloatArray
 from app.mapping.readers.file_extensions import KMZ, LNW, SHAPES, TABLES, XML_OF
-from app.mapping.readers.line_text import read_lnw, read_table
+from app.mapping.readers.survey_line_files import read_lnw, read_table
 from app.mapping.readers.types import MAX_DRAWINGS, MAX_DRAWN_CORNERS, ReadError
 
 MAX_FEATURES = 20_000

@@ -9,7 +9,7 @@ import numpy as np
 import pyproj
 
 from app.arrays import FloatArray
-from app.mapping.readers.lines import LineBlock, blocks
+from app.mapping.readers.line_blocks import LineBlock, blocks
 from app.mapping.readers.types import LOCAL, MAX_SOUNDINGS, Points, Positive, ReadError
 
 NAMES = {

@@ -18,8 +18,8 @@ from netCDF4 import Dataset
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.file_extensions import ENC, GSF, KMALL, KMZ, LNW, NETCDF, PACKED, S102, SHAPES, TABLES, TEXT
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.s102 import INSTANCE, VALUES
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid

@@ -13,8 +13,8 @@ from app.arrays import FloatArray
 from app.mapping.bag_values import NODATA
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.vr_bag import REFINED_CELLS, vr_bag
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map

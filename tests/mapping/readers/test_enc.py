@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.enc import HAZARDS, NO_ZONE_POSITION_M, ZONES_OF_CONFIDENCE, Zone, read_enc, read_zones
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_soundings
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.readers.warm_up import SMALL_CELL, SMALL_CELL_AT
 from app.mapping.s44 import NORMAL_95

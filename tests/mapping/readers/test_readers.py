@@ -25,8 +25,8 @@ from app.mapping.products.netcdf import netcdf
 from app.mapping.products.text import map_xyz, soundings_xyz
 from app.mapping.readers import raster
 from app.mapping.readers.file_extensions import ending
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.text import read_text
 from app.mapping.readers.types import MapExtent, Points, Raster, ReadError, ReadOptions
 from app.mapping.s44 import NORMAL_95, Order

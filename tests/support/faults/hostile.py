@@ -163,7 +163,7 @@ def read(reader: str, path: Path) -> str:
             return str(error)
         return ""
     from app.mapping.readers.file_extensions import ending
-    from app.mapping.readers.files import read_file
+    from app.mapping.readers.reader_choice import read_file
     from app.mapping.readers.types import ReadError
 
     try:

@@ -175,7 +175,7 @@ class Reader:
         Parameters
         ----------
         kind
-            The ending of its name, see ``app.mapping.readers.files.ending``.
+            The ending of its name, see ``app.mapping.readers.reader_choice.ending``.
 
         Raises
         ------

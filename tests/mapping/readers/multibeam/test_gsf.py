@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.multibeam.gsf import PING, SINGLE_BEAM, GsfFile
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.types import MapExtent, Points, ReadError, ReadOptions
 from app.mapping.s44 import NORMAL_95
 from app.mapping.types import Grid

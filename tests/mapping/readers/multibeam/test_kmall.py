@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from KMALL.kmall import kmall
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.multibeam.kmall import KmallFile
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.types import MapExtent, Points, ReadError, ReadOptions
 from app.mapping.types import Grid
 from tests.support.mapping.multibeam import floor, line, write_kmall

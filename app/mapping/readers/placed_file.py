@@ -6,8 +6,8 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings
+from app.mapping.readers.reader_choice import read_file
 from app.mapping.readers.types import MapExtent, ReadOptions
 from app.mapping.types import Grid
 
