@@ -21,7 +21,7 @@ from owslib.wms import WebMapService
 from PIL import Image
 from rasterio.warp import transform_bounds
 
-from tests.api.maps.ogc.conftest import SOUNDINGS, Gis
+from tests.api.maps.conftest import SOUNDINGS, Gis
 from tests.support.mapping.gis import picture_of
 from tests.support.missions.specs import FRAME
 

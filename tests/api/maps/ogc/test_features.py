@@ -8,7 +8,7 @@ import pyproj
 import pytest
 import shapely
 
-from tests.api.maps.ogc.conftest import SOUNDINGS, START_S, Gis
+from tests.api.maps.conftest import SOUNDINGS, START_S, Gis
 from tests.support.missions.specs import FRAME
 
 COLLECTIONS = ("areas", "tracks", "soundings", "contours", "holidays", "vehicles", "traffic")

@@ -11,7 +11,7 @@ from PIL import Image
 
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from tests.api.maps.ogc.conftest import START_S, Gis, depth_m
+from tests.api.maps.conftest import START_S, Gis, depth_m
 from tests.support.api.rest import mission_spec, running_in_thread
 from tests.support.missions.specs import lon_lat
 from tests.support.qgis import Qgis, installed

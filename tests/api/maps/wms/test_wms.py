@@ -16,7 +16,7 @@ from PIL import Image
 
 from app.main import Server
 from app.settings import Settings
-from tests.api.maps.ogc.conftest import Gis, depth_m
+from tests.api.maps.conftest import Gis, depth_m
 from tests.support.api.rest import make_client, mission_spec, running, soundings
 from tests.support.mapping.gis import Pixels, picture_of, tile_of
 from tests.support.missions.specs import FRAME
