@@ -16,18 +16,14 @@ from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from importlib import import_module
-from pathlib import Path
 from typing import IO, Any, ParamSpec, TypeVar
 
-import app
 from app.compute.packing import Raised, outcome
 from app.mapping.readers.confinement import ResourceLimits, limit
 from app.missions.errors import ProductUnavailableError
+from app.missions.operations import child_process
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.unnamed_file import unnamed_file
-
-ROOT = str(Path(app.__file__).resolve().parents[1])
-"""Where the process finds this program."""
 
 AT_ONCE = 1
 """Each takes a core and memory, which vehicles' decisions need."""
@@ -82,10 +78,10 @@ class WorkProcesses:
                 self._processes.add(process)
                 try:
                     if self._closing.is_set():
-                        _kill(process)
+                        child_process.kill(process)
                     yield WorkProcess(process, task, result, self._closing.is_set)
                 finally:
-                    _kill(process)
+                    child_process.kill(process)
                     await process.wait()
                     self._processes.discard(process)
 
@@ -94,7 +90,7 @@ class WorkProcesses:
         self._closing.set()
         processes = list(self._processes)
         for process in processes:
-            _kill(process)
+            child_process.kill(process)
         await asyncio.gather(*(process.wait() for process in processes))
 
 
@@ -132,19 +128,13 @@ class WorkProcess:
 
 async def _start(task: IO[bytes], result: IO[bytes], modules: Sequence[str]) -> Process:
     files = task.fileno(), result.fileno()
-    return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-P",
-        "-m",
+    return await child_process.start(
         __name__,
-        *map(str, files),
-        *modules,
+        [*map(str, files), *modules],
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.DEVNULL,
-        pass_fds=files,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))},
-        # Its own session: a signal from a terminal is not for it, and what it starts ends with it.
-        start_new_session=True,
+        files=files,
+        environment=os.environ | {"PYTHONPATH": child_process.search_path()},
     )
 
 
@@ -162,13 +152,6 @@ def _broken_off(code: int) -> ProductUnavailableError:
         f"the process that makes the file was ended before it was done ({how}): memory may be short",
         "ask again; where that does not help give the service more memory, or choose larger cells",
     )
-
-
-def _kill(process: Process) -> None:
-    """End a process that runs yet, and what it has started."""
-    if process.returncode is None:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
 
 
 def _write(file: IO[bytes], content: Any) -> None:

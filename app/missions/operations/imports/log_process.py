@@ -7,7 +7,6 @@ was read goes to standard output, each item behind its length: see ``log_items``
 import asyncio
 import os
 import pickle
-import signal
 import struct
 import sys
 from asyncio.subprocess import Process
@@ -19,6 +18,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.confinement import ResourceLimits, confine, limit
 from app.mapping.readers.warm_up import data_folders
 from app.missions.errors import InvalidRequestError
+from app.missions.operations import child_process
 from app.missions.operations.imports.log_batches import (
     LogBatch,
     LogFacts,
@@ -77,21 +77,16 @@ async def reading(file: IO[bytes], wanted: WantedLog) -> AsyncIterator[ReadingPr
     InvalidRequestError, ImportUnavailableError
         When the file is no log that can be used; when nothing here keeps the process from other files.
     """
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-P",
-        "-m",
+    process = await child_process.start(
         __name__,
-        str(file.fileno()),
+        [str(file.fileno())],
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         # What libraries write there may quote the file.
         stderr=asyncio.subprocess.DEVNULL,
-        pass_fds=(file.fileno(),),
-        env=reader_environment(),
-        cwd="/",
-        # Its own session: a signal from a terminal to the service is not for it.
-        start_new_session=True,
+        files=[file.fileno()],
+        environment=reader_environment(),
+        folder="/",
     )
     try:
         assert process.stdin is not None  # noqa: S101 - it is a pipe
@@ -104,9 +99,7 @@ async def reading(file: IO[bytes], wanted: WantedLog) -> AsyncIterator[ReadingPr
             raise _broken_off()
         yield ReadingProcess(process, opened)
     finally:
-        if process.returncode is None:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+        child_process.kill(process)
         if process.stdout is not None:
             # What nobody read any more would keep the pipe open.
             await process.stdout.read()

@@ -4,11 +4,9 @@ import asyncio
 import json
 import math
 import os
-import sys
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import asdict
-from pathlib import Path
 from typing import IO, Annotated, Any, Literal
 
 import numpy as np
@@ -16,7 +14,6 @@ import structlog
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-import app
 from app.mapping.readers.confinement import FORBIDDEN, LOCKING_CALLS
 from app.mapping.readers.types import (
     MAX_CORNERS,
@@ -33,15 +30,13 @@ from app.mapping.readers.types import (
 )
 from app.mapping.types import MAX_SD_M
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
+from app.missions.operations import child_process
 from app.missions.operations.imports.uploads import Upload
 from app.missions.spec.base import SHOWN_PATTERN
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.unnamed_file import unnamed_file
 
 log = structlog.get_logger(__name__)
-
-ROOT = str(Path(app.__file__).resolve().parents[1])
-"""Where the reading process finds this program."""
 
 READING_TIMEOUT_S = 180.0
 WAITING_TIMEOUT_S = 60.0
@@ -341,23 +336,17 @@ def _by_number(corners: NDArray[np.float64], count: int) -> list[NDArray[np.floa
 async def _run(file: IO[bytes], task: str, result: IO[bytes]) -> tuple[int, bytes]:
     """Return the reading process's exit code and what it said; one that takes or says too much is ended."""
     file.seek(0)
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-P",
-        "-m",
+    process = await child_process.start(
         "app.mapping.readers",
-        task,
-        str(result.fileno()),
+        [task, str(result.fileno())],
         stdin=file,
         stdout=asyncio.subprocess.PIPE,
         # What libraries write there may quote the file.
         stderr=asyncio.subprocess.DEVNULL,
-        pass_fds=(result.fileno(),),
-        env=reader_environment(),
+        files=[result.fileno()],
+        environment=reader_environment(),
         # The service's own folder is not its business.
-        cwd="/",
-        # Its own session: a signal from a terminal to the service is not for it.
-        start_new_session=True,
+        folder="/",
     )
     assert process.stdout is not None  # noqa: S101 - it is a pipe
     try:
@@ -378,10 +367,9 @@ async def _run(file: IO[bytes], task: str, result: IO[bytes]) -> tuple[int, byte
 
 def reader_environment() -> dict[str, str]:
     """Return what a process that will be locked in is started with: this program, and one thread for each library."""
-    search = os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))
     kept = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
     return kept | {
-        "PYTHONPATH": search,
+        "PYTHONPATH": child_process.search_path(),
         "PYTHONDONTWRITEBYTECODE": "1",
         "LANG": "C.UTF-8",
         # One thread: those that run already would not be locked in.
