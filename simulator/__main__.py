@@ -26,6 +26,7 @@ from simulator.sonars.sensors import SensorKind, SonarNoise
 from simulator.sonars.swath import SwathSonar
 from simulator.targets import RangingNoise, TargetSpec
 from simulator.vehicles.battery import BatterySpec
+from simulator.water_column import WaterColumn
 
 NEW_BATTERY = BatterySpec()
 
@@ -59,6 +60,10 @@ def main(
         float, typer.Option(help="Growth of the position's variance under water, m2/s (DUNE reports 0.02).")
     ] = 0.0,
     current: Annotated[str, typer.Option(help="EAST,NORTH velocity of the water, m/s.")] = "0,0",
+    sound_speed: Annotated[
+        str,
+        typer.Option(help="DEPTH:SPEED,... of sound (metres, m/s, linear between); vehicles then have a probe for it."),
+    ] = "",
     endurance: Annotated[
         float, typer.Option(help="Minutes that a full battery lasts at --nominal-speed.")
     ] = NEW_BATTERY.endurance_min,
@@ -163,6 +168,7 @@ def main(
             equipment,
             speed=speed,
             current=(east, north),
+            water=WaterColumn.of([_entry(text) for text in sound_speed.split(",") if text.strip()]),
             options=DuneOptions(
                 bind_address=bind,
                 announce_addresses=tuple(announce_address or ["127.0.0.1"]),
@@ -186,6 +192,14 @@ def main(
 def _start(text: str) -> tuple[float, float, float]:
     east, north, *depth = _numbers("start", text, 2, 3)
     return east, north, depth[0] if depth else 0.0
+
+
+def _entry(text: str) -> tuple[float, float]:
+    depth, colon, speed = text.partition(":")
+    if not colon:
+        raise ValueError(f"--sound-speed has {text!r}; each entry must be DEPTH:SPEED, metres and metres per second")
+    (depth_m,), (speed_mps,) = _numbers("sound-speed", depth, 1), _numbers("sound-speed", speed, 1)
+    return depth_m, speed_mps
 
 
 def _swath(text: str) -> SwathSonar:

@@ -22,6 +22,7 @@ from simulator.sonars.swath import SwathErrors, SwathSounder
 from simulator.vehicles.battery import Battery
 from simulator.vehicles.navigation import Navigation
 from simulator.vehicles.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle
+from simulator.water_column import WaterColumn
 
 log = logging.getLogger(__name__)
 
@@ -126,6 +127,11 @@ FLOATS_FROM_M = 5.0
 """It floats up from there, unless it is deeper than this."""
 AT_REST_MPS = 0.05
 
+PROBE_PERIOD_S = 0.25
+"""A sound velocity probe measures so often."""
+PROBE_SD_MPS = 0.05
+"""Standard deviation of what it measures."""
+
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
@@ -167,6 +173,8 @@ class SimulatedVehicle:
         What it carries and can do.
     current
         Water velocity (east, north), m/s.
+    water
+        How fast sound is in it, which vehicles have a probe for then; None: as fast as sonars assume, everywhere.
     start_time_s
         The vehicle's clock at the start.
 
@@ -186,6 +194,7 @@ class SimulatedVehicle:
         *,
         heading_rad: float = 0.0,
         current: tuple[float, float] = (0.0, 0.0),
+        water: WaterColumn | None = None,
         start_time_s: float = 0.0,
     ) -> None:
         east, north, depth = (float(value) for value in start)
@@ -202,11 +211,12 @@ class SimulatedVehicle:
         self.terrain = terrain
         self.time_s = float(start_time_s)
         self.vehicle = Vehicle(Motion(east, north, depth, heading_rad), carried.limits, current)
-        sonar_rng, navigation_rng = rng.spawn(2)
+        sonar_rng, navigation_rng, self._probe_rng = rng.spawn(3)
+        self.water = water
         self.battery = None if carried.battery is None else Battery(carried.battery)
         self.navigation = Navigation(carried.drift_m2ps, navigation_rng)
         self.sonar: Sonar | SwathSounder = (
-            SwathSounder(carried.swath, SwathErrors.of(carried.noise), sonar_rng, carried.mounting)
+            SwathSounder(carried.swath, SwathErrors.of(carried.noise), sonar_rng, carried.mounting, water)
             if carried.sensor == SensorKind.MULTIBEAM
             else Sonar(
                 SensorKind(carried.sensor),
@@ -215,6 +225,7 @@ class SimulatedVehicle:
                 ping_period_s=carried.ping_period_s,
                 max_range_m=carried.max_range_m,
                 mounting=carried.mounting,
+                water=water,
             )
         )
         self.collisions: list[tuple[float, LocalPosition]] = []
@@ -437,6 +448,12 @@ class SimulatedVehicle:
                 vehicle.idle()
         elif vehicle.guidance is Guidance.IDLE and speed_mps < AT_REST_MPS and not self.arrived:
             vehicle.goto(target)
+
+    def measure_sound_speed(self) -> float | None:
+        """What its probe makes of the water now, metres per second; None: it has none."""
+        if self.water is None:
+            return None
+        return self.water.speed_mps(self.vehicle.motion.depth_m) + PROBE_SD_MPS * self._probe_rng.standard_normal()
 
     def measure_swath(self) -> SwathPing:
         """One ping of a swath sonar now."""

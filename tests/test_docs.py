@@ -231,7 +231,7 @@ def values_of(schema: dict[str, Any]) -> str:
     if "prefixItems" in schema:
         return "list of " + " and ".join(values_of(item) for item in schema["prefixItems"])
     if schema["type"] == "array":
-        kinds = {"integer": "whole numbers", "string": "texts", "object": "tables"}
+        kinds = {"array": "lists", "integer": "whole numbers", "string": "texts", "object": "tables"}
         return "list of " + (
             "any of " + values_of(schema["items"]) if "enum" in schema["items"] else kinds[schema["items"]["type"]]
         )

@@ -129,9 +129,23 @@ class SimulationSettings(SettingsSection):
     current_mps: tuple[Current, Current] = Field(
         default=(0.0, 0.0), description="Velocity of the water over ground, [east, north], m/s"
     )
+    sound_speed: tuple[tuple[float, float], ...] = Field(
+        default=(),
+        description="Sound speed over depth, [[m, m/s], ...], linear between; vehicles then have a probe. Empty: "
+        "1500 m/s, as sonars assume",
+    )
     consumption_factor: float = Field(
         default=1.0, gt=0, le=10, description="How much more energy vehicles use than their endurance says"
     )
+
+    @field_validator("sound_speed")
+    @classmethod
+    def _is_a_water_column(cls, entries: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        if entries:
+            from simulator.water_column import WaterColumn  # as for families
+
+            WaterColumn.of(entries)
+        return entries
 
     @field_validator("family")
     @classmethod

@@ -23,6 +23,7 @@ from simulator.network import Address, UdpEndpoint
 from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
 from simulator.vehicles.battery import BatterySpec
 from simulator.vehicles.vehicle import STEP_S
+from simulator.water_column import WaterColumn
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)
@@ -103,6 +104,8 @@ class DuneFleet:
         Of every vehicle; None: :data:`EQUIPMENT`.
     current
         Water velocity (east, north), m/s.
+    water
+        How fast sound is in it; None: as fast as sonars assume, and no vehicle has a probe.
     options
         Network side of the nodes.
     clock_offset_s
@@ -121,6 +124,7 @@ class DuneFleet:
         *,
         speed: float = 1.0,
         current: tuple[float, float] = (0.0, 0.0),
+        water: WaterColumn | None = None,
         options: DuneOptions | None = None,
         clock_offset_s: float = 0.0,
         seed: int = 0,
@@ -143,6 +147,7 @@ class DuneFleet:
                     equipment or EQUIPMENT,
                     heading_rad=spec.heading_rad,
                     current=current,
+                    water=water,
                     start_time_s=self._simulated_s,
                 ),
                 spec.imc_id,

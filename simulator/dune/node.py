@@ -32,7 +32,7 @@ from simulator.sonars.sensors import SensorKind, cast_rays
 from simulator.targets import Ranging
 from simulator.vehicles.navigation import SURFACE_DEPTH_M
 from simulator.vehicles.vehicle import STEP_S
-from simulator.world import SimulatedVehicle
+from simulator.world import PROBE_PERIOD_S, SimulatedVehicle
 
 log = logging.getLogger(__name__)
 PORT_TRIES = 5
@@ -367,6 +367,8 @@ class FakeDune:
             further.append((Periodic(1.0, now_s), fuel))
         if self.vehicle.vehicle.current != STILL_WATER:
             further.append((Periodic(STREAM_PERIOD_S, now_s), self._send_stream_velocity))
+        if self.vehicle.water is not None:
+            further.append((Periodic(PROBE_PERIOD_S, now_s), limited("SoundSpeed", ids["CTD"], t.sound_speed)))
         return [
             *further,
             (Periodic(STEP_S, now_s), limited("EstimatedState", ids["Navigation"], t.estimated_state)),

@@ -119,6 +119,13 @@ class Telemetry:
         message.y, message.x = self._vehicle.vehicle.current
         return message
 
+    def sound_speed(self) -> imcpy.SoundSpeed:
+        """How fast its probe says that sound is where it is; a negative speed is DUNE's word for none."""
+        message = imcpy.SoundSpeed()
+        measured = self._vehicle.measure_sound_speed()
+        message.value = -1.0 if measured is None else measured
+        return message
+
     def medium(self) -> imcpy.VehicleMedium:
         """At the surface or under water."""
         message = imcpy.VehicleMedium()

@@ -17,6 +17,12 @@ from simulator.sonars.frames import to_local_frame
 from simulator.sonars.mounting import STRAIGHT, SonarMounting
 from simulator.sonars.raycasting import march
 from simulator.vehicles.vehicle import Motion
+from simulator.water_column import ASSUMED_MPS, WaterColumn
+
+STEEP = 0.05
+"""A beam that goes down less steeply than this part of its way is followed as if the water did not bend it."""
+BENDS = 2
+"""How often a beam is cast anew along where the water bends it to, by how deep it got before."""
 
 DVL_TILT_RAD = math.radians(22.5)
 
@@ -115,6 +121,42 @@ def cast_rays(
     return march(terrain.z_m, terrain.cell_m, east_m, north_m, depth_m, directions, shoalest, deepest, max_range_m)
 
 
+def told_ranges(
+    terrain: Terrain, motion: Motion, directions: FloatArray, max_range_m: float, water: WaterColumn | None
+) -> FloatArray:
+    """Return what a sonar takes the distance along each beam for, shape (n,); NaN as by :func:`cast_rays`.
+
+    Parameters
+    ----------
+    motion
+        Of the sonar.
+    directions
+        In which beams leave it: unit vectors (east, north, down), shape (n, 3).
+    water
+        What bends them; None: sound is everywhere as fast as the sonar assumes.
+    """
+
+    def cast(along: FloatArray) -> FloatArray:
+        return cast_rays(terrain, motion.east_m, motion.north_m, motion.depth_m, along, max_range_m)
+
+    ranges = cast(directions)
+    if water is None:
+        return ranges
+    told = ranges * (ASSUMED_MPS / water.speed_mps(motion.depth_m))
+    steep = np.flatnonzero(np.isfinite(ranges) & (directions[:, 2] > STEEP) & (ranges > 0.0))
+    if not steep.size:
+        return told
+    launch = np.arccos(np.minimum(directions[steep, 2], 1.0))
+    aside = directions[steep, :2] / np.maximum(np.sin(launch), 1e-12)[:, None]
+    down_m = ranges[steep] * directions[steep, 2]
+    for _ in range(BENDS):
+        bent, _range = water.beams(launch, motion.depth_m, down_m)
+        along = np.column_stack([np.sin(bent)[:, None] * aside, np.cos(bent)])
+        down_m = cast(along) * along[:, 2]
+    told[steep] = water.beams(launch, motion.depth_m, down_m)[1]
+    return told
+
+
 class Sonar:
     """One sonar of few beams on one vehicle.
 
@@ -132,6 +174,8 @@ class Sonar:
         Outside of which nothing is returned.
     mounting
         How it really sits in the vehicle.
+    water
+        What its sound goes through; None: it is everywhere as fast as the sonar assumes.
     """
 
     def __init__(
@@ -144,6 +188,7 @@ class Sonar:
         max_range_m: float = 100.0,
         min_range_m: float = 0.1,
         mounting: SonarMounting = STRAIGHT,
+        water: WaterColumn | None = None,
     ) -> None:
         if not ping_period_s > 0.0:
             raise ValueError(f"sonar: ping_period_s is {ping_period_s}; it must be positive")
@@ -155,29 +200,37 @@ class Sonar:
         self.min_range_m = min_range_m
         self._rng = rng
         self._mounting = mounting
+        self._water = water
         self._body = mounting.turned(self.beams.body)
 
-    def true_ranges(self, terrain: Terrain, motion: Motion) -> FloatArray:
-        """Ranges without any error, shape (n_beams,), NaN for no return."""
+    def exact_ranges(self, terrain: Terrain, motion: Motion) -> FloatArray:
+        """Ranges without any error but the water's, shape (n_beams,), NaN for no return."""
         motion = self._mounting.placed(motion)
         if self.kind is SensorKind.SINGLE:
-            return np.array([_altitude_m(terrain, motion)])
+            return np.array([self._below_m(terrain, motion)])
         directions = to_local_frame(self._body, motion.heading_rad, motion.pitch_rad, motion.roll_rad)
-        return cast_rays(terrain, motion.east_m, motion.north_m, motion.depth_m, directions, self.max_range_m)
+        return told_ranges(terrain, motion, directions, self.max_range_m, self._water)
+
+    def _below_m(self, terrain: Terrain, motion: Motion) -> float:
+        """What an altimeter takes its altitude for."""
+        altitude_m = _altitude_m(terrain, motion)
+        if self._water is None or not altitude_m > 0.0:
+            return altitude_m
+        return self._water.range_down_m(motion.depth_m, altitude_m)
 
     def ping_below(self, terrain: Terrain, motion: Motion) -> float:
         """The same as :meth:`ping` for a single beam, without numpy's overhead per call."""
         noise = self.noise
         if noise.outlier_rate > 0.0 or noise.dropout_rate > 0.0:
             return float(self.ping(terrain, motion)[0])
-        measured = _altitude_m(terrain, self._mounting.placed(motion))
+        measured = self._below_m(terrain, self._mounting.placed(motion))
         if noise.relative_sd > 0.0:
             measured *= 1.0 + noise.relative_sd * self._rng.standard_normal()
         return measured if self.min_range_m <= measured <= self.max_range_m else math.nan
 
     def ping(self, terrain: Terrain, motion: Motion) -> FloatArray:
         """Measured ranges, shape (n_beams,), NaN for no return."""
-        ranges = self.true_ranges(terrain, motion)
+        ranges = self.exact_ranges(terrain, motion)
         n, noise = len(ranges), self.noise
         if noise.relative_sd > 0.0:
             ranges = ranges * (1.0 + noise.relative_sd * self._rng.standard_normal(n))

@@ -12,10 +12,10 @@ from simulator.arrays import FloatArray
 from simulator.floors.terrain import Terrain
 from simulator.sonars.frames import to_local_frame
 from simulator.sonars.mounting import STRAIGHT, SonarMounting
-from simulator.sonars.sensors import SensorKind, SonarNoise, cast_rays
+from simulator.sonars.sensors import SensorKind, SonarNoise, told_ranges
 from simulator.vehicles.vehicle import Motion
+from simulator.water_column import ASSUMED_MPS, WaterColumn
 
-SOUND_SPEED_MPS = 1500.0
 OUTER_RAD = math.radians(60.0)
 """Angle from straight down at which errors that grow towards the sides are given."""
 NEAR_M = 0.1
@@ -123,6 +123,8 @@ class SwathSounder:
         Source of the errors.
     mounting
         How it really sits in the vehicle.
+    water
+        What its sound goes through; None: it is everywhere as fast as the sonar assumes.
     """
 
     kind: ClassVar = SensorKind.MULTIBEAM
@@ -133,6 +135,7 @@ class SwathSounder:
         errors: SwathErrors,
         rng: np.random.Generator,
         mounting: SonarMounting = STRAIGHT,
+        water: WaterColumn | None = None,
     ) -> None:
         self.sonar = sonar
         self.errors = errors
@@ -143,12 +146,13 @@ class SwathSounder:
         self._outwards = (self.angles_rad / OUTER_RAD) ** 2
         self._sd = np.hypot(errors.relative_sd, errors.outer_relative_sd * self._outwards)
         self._mounting = mounting
+        self._water = water
         self._body = mounting.turned(self._rays())
 
     def _rays(self) -> FloatArray:
         """Where beams really point in the sonar: unit vectors (rays * beams, 3), ray by ray."""
         errors = self.errors
-        steered = np.sin(self.angles_rad) * (1.0 + errors.sound_speed_error_mps / SOUND_SPEED_MPS)
+        steered = np.sin(self.angles_rad) * (1.0 + errors.sound_speed_error_mps / ASSUMED_MPS)
         angles = np.arcsin(np.clip(steered, -1.0, 1.0)) + math.radians(errors.roll_offset_deg)
         parts = FOOTPRINT if errors.beam_width_deg > 0.0 else FOOTPRINT[:1]
         across, along = math.radians(errors.beam_width_deg) * parts.T[:, :, None]
@@ -160,7 +164,7 @@ class SwathSounder:
         """Measured slant ranges, shape (beams,), NaN where nothing was detected."""
         motion = self._mounting.placed(motion)
         directions = to_local_frame(self._body, motion.heading_rad, motion.pitch_rad, motion.roll_rad)
-        rays = cast_rays(terrain, motion.east_m, motion.north_m, motion.depth_m, directions, self.max_range_m)
+        rays = told_ranges(terrain, motion, directions, self.max_range_m, self._water)
         rays = rays.reshape(-1, len(self.angles_rad))
         heard = np.isfinite(rays)
         rng, n, errors = self._rng, len(self.angles_rad), self.errors

@@ -97,6 +97,8 @@ def test_a_multibeam_can_be_described() -> None:
         (["--endurance", "0"], "endurance_min is 0"),
         (["--battery", "120"], "level_pct is 120"),
         (["--consumption-factor", "-1"], "consumption_factor is -1"),
+        (["--sound-speed", "0:1520,1500"], "'1500'; each entry must be DEPTH:SPEED"),
+        (["--sound-speed", "0:152"], "sound speed 152 m/s must be 1350 to 1650 m/s"),
     ],
 )
 def test_wrong_options_say_what_would_be_right(arguments: list[str], message: str) -> None:

@@ -44,6 +44,7 @@ from simulator.sonars.swath import SwathSonar
 from simulator.targets import Ranging, RangingNoise, Target
 from simulator.vehicles.battery import BatterySpec
 from simulator.vehicles.vehicle import BOAT, VehicleLimits
+from simulator.water_column import WaterColumn
 from simulator.world import SimulatedVehicle
 
 TICK_S = 0.05
@@ -224,6 +225,7 @@ class SimFleetLink(FleetLink):
                 battery=launch.battery,
             ),
             current=self._settings.current_mps,
+            water=WaterColumn.of(self._settings.sound_speed),
             start_time_s=started_s,
         )
         ranging = Ranging(targets, launch.ranging, np.random.default_rng([*seed, 1]), started_s)

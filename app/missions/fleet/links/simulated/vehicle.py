@@ -15,6 +15,7 @@ from app.missions.fleet.interface import (
     RangeReport,
     ScanReport,
     SoundingReport,
+    SoundSpeedReport,
     VehicleReport,
     WaypointOrder,
 )
@@ -25,7 +26,7 @@ from simulator.sonars.swath import SwathSounder
 from simulator.targets import Ranging
 from simulator.vehicles.battery import Battery
 from simulator.vehicles.vehicle import STEP_S
-from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle, SwathPing
+from simulator.world import PROBE_PERIOD_S, BeamReturn, LocalPosition, SimulatedVehicle, SwathPing
 
 
 class DeployedVehicle:
@@ -112,13 +113,13 @@ class DeployedVehicle:
 
 
 def lived(deployed: DeployedVehicle, passed_s: float) -> tuple[list[FleetEvent], list[FleetEvent]]:
-    """Let time pass, and return what was sounded and scanned.
+    """Let time pass, and return what was sounded, of the water too, and what was scanned.
 
-    One that looks round does so on its way, and not only where it is in the end.
+    One that looks round does so on its way, and not only where it is in the end; so does a probe.
     """
     scanning, body = deployed.scanning, deployed.body
     if scanning is None:
-        return _sounded(deployed, passed_s), []
+        return (_sounded if body.water is None else _probed)(deployed, passed_s), []
     soundings: list[FleetEvent] = []
     scans: list[FleetEvent] = []
     while passed_s > 0.0 and not scanning.collided:
@@ -135,6 +136,18 @@ def _sounded(deployed: DeployedVehicle, passed_s: float) -> list[FleetEvent]:
     if isinstance(body.sonar, SwathSounder):
         return [_ping(deployed, ping) for ping in body.advance_swath(passed_s)]
     return [_sounding(deployed, m) for m in body.advance(passed_s) if m.valid]
+
+
+def _probed(deployed: DeployedVehicle, passed_s: float) -> list[FleetEvent]:
+    """Let time pass, and return what was sounded and what a sound velocity probe measured meanwhile."""
+    events: list[FleetEvent] = []
+    while passed_s > 0.0:
+        events += _sounded(deployed, min(passed_s, PROBE_PERIOD_S))
+        passed_s -= PROBE_PERIOD_S
+        speed_mps, body = deployed.body.measure_sound_speed(), deployed.body
+        if speed_mps is not None:
+            events.append(SoundSpeedReport(body.name, body.time_s, deployed.position(body.position), speed_mps, "CTD"))
+    return events
 
 
 def _scan(deployed: DeployedVehicle, scan: Scan, scanning: Scanning) -> ScanReport:
