@@ -405,6 +405,7 @@ class MissionService:
                     await self.sites.begin(live)
                     # Also in the log: programs and consoles start missions without a look at the checklist.
                     nearby = [check.message for check in neighbour_checks(live, await self.at_sea())]
+                    await self._claims.prepare(live, [member.spec for member in live.team])
                 self._claims.claim_team(live)
                 try:
                     await self._supervisor.set_state(live, target, note, actor, check=self._may_set_off(live))

@@ -142,6 +142,12 @@ class FleetHub:
         if link is not None:
             link.check_deployment(name)
 
+    async def prepare(self, deployment: Deployment) -> None:
+        """Do beforehand what of :meth:`deploy` takes long. Raises VehicleRefusedError."""
+        link = self._links.get(deployment.vehicle.kind)
+        if link is not None:
+            await link.prepare(deployment)
+
     def deploy(self, deployment: Deployment) -> None:
         """Prepare a vehicle for its mission, where there is a link to it. Raises VehicleRefusedError."""
         link = self._links.get(deployment.vehicle.kind)

@@ -445,6 +445,9 @@ class FleetLink(ABC):
     def check_deployment(self, vehicle: str) -> None:  # noqa: B027
         """Raise VehicleRefusedError where a vehicle could be deployed now for no mission."""
 
+    async def prepare(self, deployment: Deployment) -> None:  # noqa: B027
+        """Do beforehand what of ``deploy`` takes long, while other missions go on. Raises VehicleRefusedError."""
+
     def deploy(self, deployment: Deployment) -> None:  # noqa: B027
         """Prepare a vehicle for the mission that takes it; harmless to repeat. Raises VehicleRefusedError."""
 

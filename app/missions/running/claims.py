@@ -41,6 +41,10 @@ def _taken(vehicle: str, mission: str) -> ConflictError:
     )
 
 
+def _refused(vehicle: VehicleSpec, error: VehicleRefusedError) -> ConflictError:
+    return ConflictError(f"vehicle {vehicle.name!r} {error.reason}", error.remedy)
+
+
 class Claims:
     """Takes vehicles for missions and gives them up."""
 
@@ -67,6 +71,14 @@ class Claims:
                 "wait for it, take it out of the mission, or see what 'bathyfleet doctor' finds",
             )
 
+    async def prepare(self, live: LiveMission, vehicles: Sequence[VehicleSpec]) -> None:
+        """Do beforehand what takes long when vehicles are claimed. Raises ConflictError."""
+        for vehicle in vehicles:
+            try:
+                await self._hub.prepare(_deployment(live, vehicle))
+            except VehicleRefusedError as error:
+                raise _refused(vehicle, error) from error
+
     def claim_team(self, live: LiveMission) -> None:
         """Claim every vehicle, or none when one cannot be had. Raises ConflictError."""
         before = {member.key for member in live.team if self._hub.claimed_by(member.key) == live.id}
@@ -87,7 +99,7 @@ class Claims:
             self._hub.deploy(_deployment(live, vehicle))
         except VehicleRefusedError as error:
             self._hub.release(key, live.id)
-            raise ConflictError(f"vehicle {vehicle.name!r} {error.reason}", error.remedy) from error
+            raise _refused(vehicle, error) from error
 
     def release(self, live: LiveMission, vehicle: VehicleSpec) -> None:
         """Leave one vehicle of a mission that goes on to others; a simulated one is put away."""

@@ -44,6 +44,7 @@ class TeamChanges:
                     f"vehicle {vehicle.name!r} takes part already", "choose another name, or remove the vehicle first"
                 )
             if live.header.state in AT_SEA:
+                await self._claims.prepare(live, [vehicle])
                 self._claims.claim(live, vehicle)
             try:
                 slot = await _store_joining(live, vehicle)

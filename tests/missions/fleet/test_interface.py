@@ -29,7 +29,7 @@ from app.missions.fleet.interface import (
 from app.missions.fleet.links.imc import ImcFleetLink
 from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
-from app.missions.fleet.links.simulated.launch import Launch
+from app.missions.fleet.links.simulated.launch import FloorPatch, Launch
 from app.missions.settings import SimulationSettings
 from app.missions.spec.vehicle import Sensor
 from imc_bridge import BridgeSettings
@@ -136,9 +136,7 @@ class SimBench(Bench):
                 self.name,
                 "m",
                 Sensor.SINGLE_BEAM,
-                (LAT, LON),
-                100,
-                100,
+                FloorPatch((LAT, LON), 100, 100),
                 start=FLOOR.frame.to_geodetic(50, 5),
                 noise=0.005,
             )

@@ -5,7 +5,7 @@ import pytest
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.links.sim import SimFleetLink
-from app.missions.fleet.links.simulated.launch import Launch
+from app.missions.fleet.links.simulated.launch import FloorPatch, Launch
 from app.missions.live.boundaries import Boundaries
 from app.missions.operations.history import events_after
 from app.missions.preflight.survey import preflight
@@ -168,7 +168,7 @@ async def test_simulated_vehicles_of_another_mission_are_launched_anew(service: 
     places = []
     for mission, east_m in (("m1", 20), ("m1", 40), ("m2", 60)):
         lon, lat = lon_lat(east_m, 20)
-        link.launch(Launch("a", mission, Sensor.DVL, (LAT, LON), 100, 100, start=(lat, lon), noise=0.01))
+        link.launch(Launch("a", mission, Sensor.DVL, FloorPatch((LAT, LON), 100, 100), start=(lat, lon), noise=0.01))
         [info] = link.vehicles()
         assert info.report is not None
         places.append(round((info.report.position.lon_deg - LON) / (lon_lat(1, 0)[0] - LON)))

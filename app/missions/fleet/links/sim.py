@@ -1,6 +1,7 @@
 """Vehicles simulated inside the service, over a sea floor laid under each mission's area."""
 
 import asyncio
+import contextlib
 import math
 import threading
 from collections.abc import Sequence
@@ -29,7 +30,15 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.simulated.launch import FinalState, Launch, Lookout, lay, target_in, terrain_of
+from app.missions.fleet.links.simulated.launch import (
+    FinalState,
+    FloorPatch,
+    Launch,
+    Lookout,
+    lay,
+    target_in,
+    terrain_of,
+)
 from app.missions.fleet.links.simulated.vehicle import DeployedVehicle, lived, ranges
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
@@ -105,7 +114,7 @@ class SimFleetLink(FleetLink):
         self._battery = battery or BatterySpec(consumption_factor=settings.consumption_factor)
         self._time_scale = time_scale
         self._told_of_pace = False
-        self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
+        self._terrains: dict[FloorPatch, Terrain] = {}
         self._deployed: dict[str, DeployedVehicle] = {}
         self._final_states: dict[str, FinalState] = {}
         self._sink: EventSink = lambda _event: None
@@ -134,8 +143,16 @@ class SimFleetLink(FleetLink):
         try:
             terrain_of(self._settings.terrain)
         except TerrainError as error:
-            remedy = "Name a terrain file in simulation.terrain that can be read, or none"
-            raise VehicleRefusedError(vehicle, f"cannot be launched: {error}", remedy) from error
+            raise _no_floor(vehicle, error) from error
+
+    async def prepare(self, deployment: Deployment) -> None:
+        """Lay the sea floor of a mission, which for a large area takes seconds. Raises VehicleRefusedError."""
+        patch = FloorPatch.under(deployment.mission)
+        if patch not in self._terrains:
+            try:
+                self._keep_terrain(patch, await asyncio.to_thread(lay, self._settings, patch))
+            except TerrainError as error:
+                raise _no_floor(deployment.vehicle.name, error) from error
 
     def deploy(self, deployment: Deployment) -> None:
         """Launch a vehicle where its mission has it begin, or where the mission that this one follows left it.
@@ -144,7 +161,6 @@ class SimFleetLink(FleetLink):
         """
         self.check_deployment(deployment.vehicle.name)
         vehicle, mission, world = deployment.vehicle, deployment.mission, deployment.world()
-        frame, size = mission.frame(), mission.local_area().max(axis=0)
         final = self._final_states.get(vehicle.name)
         if final is not None and (final.mission_id != mission.after or vehicle.start is not None):
             final = None
@@ -156,9 +172,7 @@ class SimFleetLink(FleetLink):
             vehicle=vehicle.name,
             mission_id=deployment.mission_id,
             sensor=vehicle.sensor,
-            south_west=(frame.origin_lat_deg, frame.origin_lon_deg),
-            width_m=float(size[0]),
-            height_m=float(size[1]),
+            floor=FloorPatch.under(mission),
             start=(vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else deployment.berth(),
             noise=mission.sounding_noise,
             swath=SwathSonar(**(vehicle.sonar or SwathSonarSpec()).model_dump()),
@@ -203,7 +217,7 @@ class SimFleetLink(FleetLink):
         if there is not None and there.mission_id == launch.mission_id:
             return
         self.put_away(launch.vehicle)
-        terrain = self._terrain(launch)
+        terrain = self._terrain(launch.floor)
         seed = [self._settings.seed, *launch.vehicle.encode()]
         started_s = now().timestamp()
         moving = [target for target in launch.targets if target.simulated is not None]
@@ -305,14 +319,16 @@ class SimFleetLink(FleetLink):
         """Take a vehicle out of the world; nothing happens when it is not there."""
         self._deployed.pop(vehicle, None)
 
-    def _terrain(self, launch: Launch) -> Terrain:
+    def _terrain(self, patch: FloorPatch) -> Terrain:
         """Return the sea floor of a mission's area; its vehicles share one, which takes a while to lay."""
-        key = (*launch.south_west, launch.width_m, launch.height_m)
-        if key not in self._terrains:
-            while len(self._terrains) >= KEPT_TERRAINS:
-                del self._terrains[next(iter(self._terrains))]
-            self._terrains[key] = lay(self._settings, launch)
-        return self._terrains[key]
+        if patch not in self._terrains:
+            self._keep_terrain(patch, lay(self._settings, patch))
+        return self._terrains[patch]
+
+    def _keep_terrain(self, patch: FloorPatch, terrain: Terrain) -> None:
+        while len(self._terrains) >= KEPT_TERRAINS:
+            del self._terrains[next(iter(self._terrains))]
+        self._terrains[patch] = terrain
 
     def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
         if launch.start is not None:
@@ -388,6 +404,10 @@ class SimFleetLink(FleetLink):
         return StopReceipt(vehicle, acknowledged=True, detail="motor off")
 
     def _warm_up(self) -> None:
+        if self._settings.terrain is not None:
+            # Of a file that cannot be read the checklist tells.
+            with contextlib.suppress(TerrainError):
+                terrain_of(self._settings.terrain)
         if wait_for_compiling(RAYS, ending=self._ending):
             warm_up()
 
@@ -474,6 +494,11 @@ class SimFleetLink(FleetLink):
         elif deployed.raised_to_m < ahead.depth_m and bottom_m - ahead.depth_m > least_m + ROOM_M:
             deployed.raised_to_m = math.inf
             deployed.head_for(order, ahead, ahead.depth_m)
+
+
+def _no_floor(vehicle: str, error: TerrainError) -> VehicleRefusedError:
+    remedy = "Name a terrain file in simulation.terrain that can be read, or none"
+    return VehicleRefusedError(vehicle, f"cannot be launched: {error}", remedy)
 
 
 def _limits_of(launch: Launch) -> VehicleLimits:

@@ -24,7 +24,7 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.sim import FORSAKEN_S, SimFleetLink
-from app.missions.fleet.links.simulated.launch import MOST_CELLS, Launch, lay
+from app.missions.fleet.links.simulated.launch import MOST_CELLS, FloorPatch, Launch, lay
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.targets import TargetSpec
@@ -40,11 +40,12 @@ from tests.support.waiting import until
 
 FLOOR = seafloors.generate("harbour", 0, origin=(LAT, LON))
 NAME = "s"
+PATCH = FloorPatch((LAT, LON), 100.0, 100.0)
 
 
 def launch(battery: BatterySpec) -> Launch:
     start = FLOOR.frame.to_geodetic(50, 5)
-    return Launch(NAME, "m", Sensor.SINGLE_BEAM, (LAT, LON), 100, 100, start=start, noise=0.005, battery=battery)
+    return Launch(NAME, "m", Sensor.SINGLE_BEAM, PATCH, start=start, noise=0.005, battery=battery)
 
 
 def order(step: int, east_m: float, north_m: float, speed_mps: float = 1.0) -> WaypointOrder:
@@ -59,13 +60,13 @@ def has_arrived(events: list[FleetEvent], step: int = 1) -> bool:
 
 def test_the_floor_of_a_large_area_has_wider_cells() -> None:
     """At 1 m that of 20 km x 20 km took all memory of the machine, and with it the service."""
-    large = replace(launch(BatterySpec()), width_m=5000.4, height_m=2000.0)
+    large = FloorPatch((LAT, LON), 5000.4, 2000.0)
     floor = lay(SimulationSettings(family="flat"), large)
     assert floor.z_m.size <= MOST_CELLS
     assert floor.cell_m == 2
     assert 0 < floor.width_m - large.width_m <= 2
     assert 0 < floor.height_m - large.height_m <= 2
-    assert lay(SimulationSettings(family="flat"), launch(BatterySpec())).cell_m == 1
+    assert lay(SimulationSettings(family="flat"), PATCH).cell_m == 1
 
 
 async def test_it_tells_its_energy_and_the_current() -> None:

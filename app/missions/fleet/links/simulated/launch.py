@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from app.missions.settings import SimulationSettings
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.targets import TargetSpec
 from app.missions.spec.vehicle import Sensor
 from simulator.floors.seafloors import generate
@@ -41,6 +42,21 @@ class FinalState:
 
 
 @dataclass(frozen=True)
+class FloorPatch:
+    """Where the sea floor of a mission lies: latitude and longitude of its south-western corner, and its extent."""
+
+    south_west: tuple[float, float]
+    width_m: float
+    height_m: float
+
+    @classmethod
+    def under(cls, mission: MissionSpec) -> "FloorPatch":
+        """Return that of a mission's area."""
+        frame, size = mission.frame(), mission.local_area().max(axis=0)
+        return cls((frame.origin_lat_deg, frame.origin_lon_deg), float(size[0]), float(size[1]))
+
+
+@dataclass(frozen=True)
 class Launch:
     """Where and how a simulated vehicle comes into the world.
 
@@ -50,10 +66,8 @@ class Launch:
         Its name and its sonar.
     mission_id
         Whose it is.
-    south_west
-        Latitude and longitude of the sea floor's corner.
-    width_m, height_m
-        Extent of a generated sea floor.
+    floor
+        Where the sea floor lies.
     start
         Latitude and longitude; None: in the south-western corner, beside those already there.
     noise
@@ -74,9 +88,7 @@ class Launch:
     vehicle: str
     mission_id: str
     sensor: Sensor
-    south_west: tuple[float, float]
-    width_m: float
-    height_m: float
+    floor: FloorPatch
     start: tuple[float, float] | None
     noise: float
     swath: SwathSonar = SwathSonar()  # noqa: RUF009 - frozen
@@ -108,20 +120,23 @@ def _read(file: Path, _version: tuple[int, int, int] | None) -> Terrain | Terrai
         return error
 
 
-def lay(settings: SimulationSettings, launch: Launch) -> Terrain:
-    """Return the sea floor for a launch: the file that settings name, or a generated one under the area."""
+def lay(settings: SimulationSettings, patch: FloorPatch) -> Terrain:
+    """Return a sea floor: the file that settings name, or a generated one that covers the patch.
+
+    Raises TerrainError.
+    """
     if settings.terrain is not None:
         terrain = terrain_of(settings.terrain)
-        return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
-    cell_m = max(1, math.ceil(math.sqrt(launch.width_m * launch.height_m / MOST_CELLS)))
+        return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*patch.south_west)
+    cell_m = max(1, math.ceil(math.sqrt(patch.width_m * patch.height_m / MOST_CELLS)))
     # Whole cells that cover the area to its border and a little more.
     return generate(
         settings.family,
         settings.seed,
-        width_m=cell_m * max(2, math.ceil((launch.width_m + 1e-3) / cell_m)),
-        height_m=cell_m * max(2, math.ceil((launch.height_m + 1e-3) / cell_m)),
+        width_m=cell_m * max(2, math.ceil((patch.width_m + 1e-3) / cell_m)),
+        height_m=cell_m * max(2, math.ceil((patch.height_m + 1e-3) / cell_m)),
         cell_m=cell_m,
-        origin=launch.south_west,
+        origin=patch.south_west,
     )
 
 
