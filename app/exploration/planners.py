@@ -58,7 +58,8 @@ def create_planner(
     ----------
     name : str
         One of ``PLANNERS``. A lawnmower with landmark sensors flies as one formation. ``rollout`` with a bathymeter
-        is ``cao``: its survey regressors are a plan of the whole mission already.
+        is ``cao``: its survey regressors are a plan of the whole mission already. With landmark sensors ``pcao``
+        falls back on ``rollout`` where it would not be done in time.
     options : PlannerOptions
         Its settings.
     sensor : RangeSensor or SingleBeam
@@ -80,6 +81,8 @@ def create_planner(
         return FormationLawnmower(options, sensor)
     if planner is RolloutPlanner and not isinstance(sensor, RangeSensor):
         return CaoPlanner(options, sensor)
+    if planner is PcaoPlanner and isinstance(sensor, RangeSensor):
+        return PcaoPlanner(options, sensor, fallback=RolloutPlanner(options, sensor))
     return planner(options, sensor)
 
 

@@ -13,7 +13,7 @@ from simulator.floors.terrain_files import save_npz
 EXPLORE = {
     "planner", "terrain", "seed", "robots", "landmarks", "steps", "remaining_pct", "t99", "sum_of_error", "history",
     "distance", "wall_s", "plan_ms_median", "plan_ms_p99", "real_tries",
-    "broken_constraints", "done_nees", "done_within_pct",
+    "broken_constraints", "done_nees", "done_within_pct", "fallback_steps",
 }  # fmt: skip
 SURVEY = {"rmse_m", "l2_norm", "samples", "distance_m", "time_s", "coverage_pct"}
 

@@ -56,6 +56,7 @@ class ExploreRun:
     message_bytes: int
     done_nees: float | None
     done_within_pct: float | None
+    fallback_steps: int
 
 
 def run_explore(
@@ -83,7 +84,7 @@ def run_explore(
         else UnlimitedTeam(world)
     )
     team.sense(noise)
-    history, plan_s, distance, broken, error = [], [], 0.0, 0, 0.0
+    history, plan_s, distance, broken, error, fallback_steps = [], [], 0.0, 0, 0.0, 0
     for step in range(1, scenario.steps + 1):
         world.change_team(step)
         vehicles, at, belief = team.report(step)
@@ -100,6 +101,7 @@ def run_explore(
         t0 = time.perf_counter()
         proposal = chooser.propose(situation, choice)
         plan_s.append(time.perf_counter() - t0)
+        fallback_steps += int(proposal.terms.get("fallback", 0.0))
         positions = world.clear(team.order(vehicles, proposal.positions))
         broken += world.broken(positions)
         distance += float(np.linalg.norm(positions - world.positions, axis=1).sum())
@@ -131,6 +133,7 @@ def run_explore(
         message_bytes=team.sent_bytes,
         done_nees=nees,
         done_within_pct=within,
+        fallback_steps=fallback_steps,
     )
 
 

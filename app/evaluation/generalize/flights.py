@@ -67,7 +67,7 @@ def pcao(floor: Terrain, seed: int, size: Size) -> Trial:
     linked: ExploreRun = run_explore(scenario, "pcao", PlannerOptions(), observe=seen)
     left = max(paper, linked.remaining_pct)
     facts = {"paper_left_pct": paper, "linked_left_pct": linked.remaining_pct}
-    facts |= {"broken": float(linked.broken_constraints)}
+    facts |= {"broken": float(linked.broken_constraints), "fallback_steps": float(linked.fallback_steps)}
     kept = left <= MOST_LEFT_PCT + 1e-9
     return Trial(left, MOST_LEFT_PCT, kept, facts, seen.tracks(half), seen.missed(half))
 

@@ -1,5 +1,6 @@
 """PCAO (PCAO18): a controller trained beforehand leads the team; see :mod:`app.exploration.pcao`."""
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import next_waypoint
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.model import default_model
+from app.exploration.pcao.pace import Pace
 from app.exploration.pcao.state import reduced_state
 from app.exploration.pcao.visits import Visits, no_visits, visiting_depth, watch
 from app.exploration.planner.base import PlannerBase, at_depth, settle
@@ -60,12 +62,18 @@ GETS_ON = 0.1
 
 
 class PcaoPlanner(PlannerBase):
-    """A controller that was trained in simulation: one product of matrices per step, for any number of vehicles."""
+    """A controller that was trained in simulation: one product of matrices per step, for any number of vehicles.
+
+    Parameters
+    ----------
+    fallback
+        What leads a team that explores from then on when it would not be done in time; None: nothing does.
+    """
 
     name: ClassVar[str] = "pcao"
     own_options: ClassVar[frozenset[str]] = frozenset({"model", "accuracy_sd_m"})
 
-    def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
+    def __init__(self, options: PlannerOptions, sensor: Sensor, fallback: PlannerBase | None = None) -> None:
         super().__init__(options, sensor)
         model = default_model() if options.model is None else options.model
         self._horizontal, self._vertical = model.gains
@@ -74,8 +82,22 @@ class PcaoPlanner(PlannerBase):
         self._lead = ""
         self._visits = no_visits(0, 0)
         self._visitors: tuple[str, ...] = ()
+        self._fallback = None if self._surveys else fallback
+        self._pace = Pace()
+        self._fell_back = False
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        if self._fallback is not None:
+            self._pace.note(int((~team.belief.accurate).sum()))
+            steps_left = team.steps_total - team.step + 1
+            self._fell_back = self._fell_back or self._pace.is_too_slow(len(team.belief.accurate), steps_left)
+            if self._fell_back:
+                proposal = self._fallback.stand_in(self, team, bottom, seed)
+                return replace(proposal, terms={**proposal.terms, "fallback": 1.0})
+        return self._led(team, bottom)
+
+    def _led(self, team: Situation, bottom: Bottom) -> Proposal:
+        """Decide by the controller and its visits."""
         belief, limits, here = team.belief, team.constraints, team.positions
         area = Polygon(limits.area).area
         unit = self._unit(team, area)
@@ -392,6 +414,8 @@ class PcaoPlanner(PlannerBase):
             "lead": self._lead,
             "visitors": list(self._visitors),
             "visits": self._visits._asdict(),
+            "pace": self._pace.left,
+            "fallback": self._fallback._remember() if self._fallback is not None and self._fell_back else None,
         }
 
     def _recall(self, state: dict[str, Any]) -> None:
@@ -401,6 +425,11 @@ class PcaoPlanner(PlannerBase):
         # Missions that an earlier release began have made no visits.
         self._visitors = tuple(str(name) for name in state.get("visitors", ()))
         self._visits = _visits(state["visits"]) if "visits" in state else no_visits(0, 0)
+        self._pace = Pace(state.get("pace", ()))
+        fallback = state.get("fallback")
+        self._fell_back = fallback is not None
+        if self._fallback is not None and fallback is not None:
+            self._fallback._recall(fallback)
 
 
 def towards(at: FloatArray, goal: FloatArray, depth: float, looks: int, step: float, unit: float) -> FloatArray:

@@ -121,6 +121,11 @@ class PlannerBase(ABC):
         wish[moves] = proposal.positions
         return replace(proposal, positions=settle(team, bottom, wish[None])[0])
 
+    def stand_in(self, other: "PlannerBase", team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        """Decide in place of another planner, which keeps errands and cruise depths."""
+        self._cruise, self._whole = other._cruise, other._whole
+        return self._decide(team, bottom, seed)
+
     @abstractmethod
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         """Decide for vehicles in the order of their names."""

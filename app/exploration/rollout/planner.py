@@ -146,7 +146,8 @@ class RolloutPlanner(PlannerBase):
         self._names, self._planned = tuple(state["names"]), int(state["planned"])
         self._heights = np.array(state["heights"], dtype=np.float64)
         self._sinking = np.array(state["sinking"], dtype=np.float64)
-        self._least_m = np.array(state["least"], dtype=np.float64)
+        least_m = np.array(state["least"], dtype=np.float64)
+        self._least_m = np.where(np.isnan(least_m), -np.inf, least_m)  # JSON has no infinity
         self._felt.recall(state["felt"])
         self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 3) for name, at in state["routes"].items()}
         self._away = {str(name): float(part) for name, part in state["away"].items()}

@@ -9,6 +9,7 @@ from app.estimation import RangeSensor, SingleBeam
 from app.evaluation.explore.run import run_explore
 from app.evaluation.explore.world import ExploreScenario
 from app.exploration.core.constraints import Constraints
+from app.exploration.pcao.pace import Pace
 from app.exploration.pcao.visits import HEIGHT, LOOKS, PATIENCE, no_visits, visiting_move, watch
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
@@ -90,7 +91,14 @@ def test_a_visitor_goes_over_the_landmark_and_down(depth: float) -> None:
     assert at[2] == pytest.approx(0.85 if np.isnan(depth) else depth - HEIGHT * UNIT)
 
 
+@pytest.fixture
+def no_fallback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller leads to the end, however slow it is."""
+    monkeypatch.setattr(Pace, "is_too_slow", lambda *_: False)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_fallback")
 def test_a_team_over_sand_waves_leaves_next_to_nothing() -> None:
     scenario = ExploreScenario(unseen_floor("dunes", 2), landmarks=500, seed=2)
     run = run_explore(scenario, "pcao", PlannerOptions())
@@ -98,6 +106,7 @@ def test_a_team_over_sand_waves_leaves_next_to_nothing() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_fallback")
 @pytest.mark.parametrize(("family", "seed"), [("dunes", 6), ("moraine", 6)])
 def test_a_linked_team_climbs_over_what_bars_one_of_it_or_parts_it(family: str, seed: int) -> None:
     run = run_explore(ExploreScenario(unseen_floor(family, seed), seed=seed), "pcao", PlannerOptions())

@@ -7,10 +7,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import create_planner
 from app.exploration.rollout.allowed_raster import allowed_raster, clear_ways, settle_waypoint
 from app.exploration.rollout.flight import (
     DIVE,
@@ -30,7 +33,7 @@ from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
 from app.exploration.rollout.tour import shortest_order, tour_of
 from app.exploration.rollout.unseen import deeper_than_presumed, look_in_vain
-from tests.support.exploration.situations import SQUARE, make_situation
+from tests.support.exploration.situations import SQUARE, make_belief, make_situation
 
 CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 RULES = Rules(0.05, 0.3, -1.0, 1.0, 0.4, 0.1, cut_corners=True)
@@ -438,3 +441,14 @@ def test_a_plan_outlives_a_change_of_the_team() -> None:
     np.testing.assert_allclose(more.at_m[:, 3], [[0.0, 0.6], [0.5, 0.6]])
     assert more.chain.tolist() == [0, 1, 2, 3]
     assert with_team(plan, ("a", "b", "c"), ("x", "y")) is None
+
+
+def test_a_restored_planner_goes_on_among_landmarks_that_were_never_seen() -> None:
+    situation = make_situation(
+        belief=make_belief(known=False), constraints=Constraints(SQUARE, max_step_m=5.0, com_range_m=20.0)
+    )
+    one, other = (create_planner("rollout", PlannerOptions(rollouts=8), RangeSensor(10.0)) for _ in range(2))
+    one.propose(situation, np.random.default_rng(0))
+    other.restore(one.snapshot())
+    a, b = (planner.propose(situation, np.random.default_rng(1)).positions for planner in (one, other))
+    np.testing.assert_array_equal(a, b)
