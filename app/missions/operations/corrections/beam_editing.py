@@ -16,7 +16,7 @@ from app.mapping.swath.pings import Pings, PlacedPings
 from app.mapping.swath.rulings import BeamSet, joined
 from app.mapping.swath.spikes import states_of
 from app.missions.clock import now
-from app.missions.errors import BeamEditNotFoundError, ConflictError
+from app.missions.errors import BeamEditNotFoundError, ConflictError, InvalidRequestError
 from app.missions.live.mission import LiveMission
 from app.missions.soundings.beam_edits import BeamEdit, rulings_of
 from app.missions.views.measurements.beams import (
@@ -45,10 +45,11 @@ BESIDE = 2
 async def beam_points(live: LiveMission, selection: BeamSelection, limit: int) -> BeamPoints:
     """Return the beams of a selection, as they are placed now, and what became of each.
 
-    Raises ConflictError where no swath sonar has measured, PingsUnreadableError.
+    Raises ConflictError where no swath sonar has measured, InvalidRequestError where its area is far away,
+    PingsUnreadableError.
     """
     points = _Points(live, limit)
-    await _select(live, selection, points.take)
+    await _select(live, selection, _area_of(live, selection, "area"), points.take)
     return await live.in_background(points.view)
 
 
@@ -59,11 +60,14 @@ async def rule_beams(live: LiveMission, request: BeamRulingRequest, ruling: Ruli
     ------
     ConflictError
         Where there are no such beams, or too many.
+    InvalidRequestError
+        Where the area of the selection is far away.
     PingsUnreadableError
     """
     if request.selection is not None:
         chosen = _Chosen()
-        await _select(live, request.selection, chosen.take)
+        area = _area_of(live, request.selection, "selection.area")
+        await _select(live, request.selection, area, chosen.take)
         beams = await live.in_background(chosen.by_vehicle)
     else:
         beams = await _named(live, request.pings)
@@ -159,11 +163,26 @@ class _Found:
     beam: IntArray
 
 
-async def _select(live: LiveMission, selection: BeamSelection, take: Callable[[_Found], None]) -> None:
+def _area_of(live: LiveMission, selection: BeamSelection, field: str) -> Polygon | None:
+    """Return the area of a selection in the mission's frame. Raises InvalidRequestError, naming the ``field``."""
+    if selection.area is None:
+        return None
+    try:
+        area = Polygon(live.spec.to_local(selection.area))
+    except ValueError as error:
+        words, _, advice = str(error).rpartition(": ")
+        raise InvalidRequestError(field, f"it is far from the mission: {words}", advice) from error
+    shapely.prepare(area)
+    return area
+
+
+async def _select(
+    live: LiveMission, selection: BeamSelection, area: Polygon | None, take: Callable[[_Found], None]
+) -> None:
     """Look through all accepted pings for the beams of a selection; ``take`` runs in threads, once for some pings."""
     # Each looks at all beams, in the threads that make maps.
     async with live.part(_Turn).taken:
-        await _look_through(live, selection, take)
+        await _look_through(live, selection, area, take)
 
 
 class _Turn:
@@ -173,13 +192,11 @@ class _Turn:
         self.taken = asyncio.Lock()
 
 
-async def _look_through(live: LiveMission, selection: BeamSelection, take: Callable[[_Found], None]) -> None:
+async def _look_through(
+    live: LiveMission, selection: BeamSelection, area: Polygon | None, take: Callable[[_Found], None]
+) -> None:
     await live.journal.flush()
     until = await live.pings.newest_block()
-    area = None
-    if selection.area is not None:
-        area = Polygon(live.spec.to_local(selection.area))
-        shapely.prepare(area)
     place = live.gate.corrections.placing()
     swath = False
 

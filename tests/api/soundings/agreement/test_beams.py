@@ -165,6 +165,7 @@ async def test_of_many_beams_those_of_some_pings_are_shown(client: httpx.AsyncCl
 
 
 PING = {"vehicle": "rover", "time_s": START_S, "beams": [0]}
+SWAPPED = {"type": "Polygon", "coordinates": [[[y, x] for x, y in rectangle(0, 0, 9, 9)["coordinates"][0]]]}
 
 
 @pytest.mark.parametrize(
@@ -175,6 +176,7 @@ PING = {"vehicle": "rover", "time_s": START_S, "beams": [0]}
         ({"selection": IN_SCHOOL, "pings": [PING]}, 422, "give one of the two"),
         ({"selection": {"least_depth_m": 9.0, "most_depth_m": 3.0}}, 422, "swap them"),
         ({"selection": {"depth_m": 9.0}}, 422, "selection.depth_m"),
+        ({"selection": {"area": SWAPPED}}, 422, "latitude and longitude look exchanged"),
         ({"selection": {"least_depth_m": 900.0}}, 409, "no beam is there"),
         ({"selection": {"vehicle": "stranger"}}, 409, "no beam is there"),
         ({"pings": [PING | {"beams": [len(ANGLES)]}]}, 409, "1 of 1 beams of rover are not there"),
@@ -189,6 +191,15 @@ async def test_what_cannot_be_meant_is_refused_and_nothing_changes(
     assert answer.status_code == status, answer.text
     assert words in answer.text
     assert (await client.get(f"{path}/beams/edits")).json()["edits"] == []
+
+
+async def test_points_of_an_area_that_is_far_away_are_refused_with_its_field(client: httpx.AsyncClient) -> None:
+    path = await mission(client)
+    answer = await client.post(f"{path}/beams/points", json={"area": SWAPPED})
+    assert answer.status_code == 422, answer.text
+    (fault,) = answer.json()["errors"]
+    assert fault["field"] == "area"
+    assert fault["expected"].startswith("latitude and longitude look exchanged, give latitude 41.1")
 
 
 async def test_without_a_swath_sonar_there_are_no_beams(client: httpx.AsyncClient) -> None:
