@@ -328,6 +328,11 @@ class _Points:
         self._total += len(at)
         self._parts.append(self._thinned(np.column_stack(columns)))
         while sum(len(part) for part in self._parts) > self._limit:
+            if self._every > self._pings:
+                # The first ping is left, and has more beams by itself.
+                first = np.concatenate(self._parts)
+                self._parts = [first[np.linspace(0, len(first) - 1, self._limit).astype(int)]]
+                return
             self._every *= 2
             self._parts = [self._thinned(part) for part in self._parts]
 

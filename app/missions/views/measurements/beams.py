@@ -57,7 +57,8 @@ class BeamPointsRequest(BeamSelection):
         default=50_000,
         ge=1,
         le=MOST_NAMED,
-        description="Most points in the answer. Of more beams those of every second ping, or fourth, and so on come",
+        description="Most points in the answer. Of more beams those of every second ping, or fourth, and so on come; "
+        "where one ping has more, some of its beams",
     )
 
 

@@ -157,6 +157,9 @@ async def test_of_many_beams_those_of_some_pings_are_shown(client: httpx.AsyncCl
     assert (some["total"], some["every"]) == (PINGS * len(ANGLES), 4)
     assert len(some["depth_m"]) == 10 * len(ANGLES)
     assert some["time_s"] == every["time_s"][::4]
+    few = await points(client, path, limit=3)
+    assert (few["total"], few["beam"]) == (PINGS * len(ANGLES), [0, (len(ANGLES) - 1) // 2, len(ANGLES) - 1])
+    assert few["time_s"] == every["time_s"][:1]
     middle = [k for k, beam in enumerate(every["beam"]) if beam == 10 and every["ping"][k] == 3]
     lon, lat = lon_lat(8.0, 30.0)
     assert every["lon_deg"][middle[0]] == pytest.approx(lon, abs=1e-7)
