@@ -202,7 +202,10 @@ class _Search:
         self._begun = False
 
     def go_on(self, size: int, share: float, free: Sequence[int] | None = None) -> Step:
-        """Make one step with cells of so many times the smallest; ``free``: None: whatever is known there."""
+        """Make one step with cells of so many times the smallest; ``free``: None: whatever is known there.
+
+        Where lines share no ground as they are placed now the step is empty, and nothing is moved.
+        """
         cells = self._cells_of(self._at, size)
         step = Step(np.zeros(0), np.zeros(0), np.zeros((0, 3)))
         if len(cells):
@@ -222,6 +225,8 @@ class _Search:
 
     def judged(self, free: Sequence[int], step: Step) -> dict[int, Known]:
         """Return which of the free parameters are not known after a last step, and why; none: all are."""
+        if not len(step.change):
+            return dict.fromkeys(free, Known.UNSETTLED)
         if _excess(step, free).max() > 1.0:
             return {_least_known(self._equations, step, free): Known.UNDETERMINED}
         # They depend on each other: where one is not found, neither are others but the roll.
@@ -234,8 +239,8 @@ class _Search:
         return {}
 
     def has_settled(self, step: Step, free: Sequence[int]) -> bool:
-        """Whether the last step moved nothing by more than it is sure of."""
-        return bool((np.abs(step.change) <= 0.5 * self._still(step, free)).all())
+        """Whether the last step moved nothing by more than it is sure of, and no other would."""
+        return not len(step.change) or bool((np.abs(step.change) <= 0.5 * self._still(step, free)).all())
 
     def _still(self, step: Step, free: Sequence[int]) -> FloatArray:
         """Return the steps (p,) within which parameters count as settled."""

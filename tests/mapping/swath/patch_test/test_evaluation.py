@@ -7,7 +7,9 @@ import pytest
 
 from app.mapping.swath.mounting import STRAIGHT, Mounting
 from app.mapping.swath.patch_test import PARAMETERS, Known, LineErrors, MountingEstimate, NoOverlapError, NotWantedError
+from app.mapping.swath.pings import Pings
 from tests.support.mapping.patch_lines import (
+    FRAME,
     PATCH,
     THERE_AND_BACK,
     Errors,
@@ -58,6 +60,35 @@ def test_lines_of_one_speed_do_not_tell_latency_and_lines_in_one_direction_no_ro
 def test_lines_that_share_no_ground_are_refused() -> None:
     with pytest.raises(NoOverlapError):
         told(lines(flat, STRAIGHT, [THERE_AND_BACK[0]], seed=0))
+
+
+def test_lines_that_part_while_mountings_are_tried_tell_nothing() -> None:
+    found = told(hardly_overlapping(), errors=LineErrors(1.0, 0.1))
+    assert (known(found), found.proposal) == (set(), None)
+    assert found.agreement.before_m == found.agreement.after_m > 0.1
+
+
+def hardly_overlapping() -> Pings:
+    """Three lines side by side whose outer beams see different ground."""
+    ping, beam = np.arange(300)[:, None], np.arange(60)
+    line, along = np.divmod(ping[:, 0], 100)
+    along = np.where(line % 2, 99 - along, along) / 99.0
+    lat, lon = FRAME.to_geographic(8.4 + 16.8 * line, 5.6 + 88.9 * along)
+    angle = np.radians(np.linspace(-60.0, 60.0, 60))
+    depth = (10.0 + 2.0 * np.sin(6.0 * along) + 0.3 * np.cos(line))[:, None]
+    level = np.zeros(300)
+    return Pings(
+        time_s=ping[:, 0] + 20.0 * line,
+        lat_deg=lat,
+        lon_deg=lon,
+        depth_m=np.ones(300),
+        roll_rad=level,
+        pitch_rad=level,
+        heading_rad=np.pi * (line % 2),
+        position_sd_m=np.full(300, 0.3),
+        angle_rad=np.tile(angle, (300, 1)).astype(np.float32),
+        range_m=(depth / np.cos(angle) + 0.05 * np.sin(7.0 * beam + ping)).astype(np.float32),
+    )
 
 
 def test_nothing_is_searched_for_on_behalf_of_nobody() -> None:
