@@ -206,7 +206,8 @@ def _entry(entry: str, number: int) -> tuple[float, float, bool]:
         year, month, day = (int(match[part]) for part in ("year", "month", "day"))
         hour, minute, second = (int(match[part] or 0) for part in ("hour", "minute", "second"))
         time = datetime(year, month, day, hour, minute, second, tzinfo=_zone(zone))
-    except ValueError as error:
+        time.astimezone(UTC)
+    except (ValueError, OverflowError) as error:
         raise TideTableError(f"line {number}: {entry[:60]!r} is no date and time ({error})") from None
     time_s = time.timestamp() + 1e-6 * int((match["fraction"] or "0").ljust(6, "0"))
     level = float(match["level"].replace(",", "."))

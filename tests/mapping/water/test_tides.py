@@ -146,6 +146,8 @@ def test_levels_too_far_apart_to_tell_the_tide_are_not_taken_for_extremes(every_
         (TABLE + "2019-01/02 06:08 1.0", "line 9: .* is not of the form"),
         ("30/11/2026 11:00 1.0\n30/11/2026 11:06 1.1", "line 1: '30/11/2026 11:00 1.0' .* write the year first"),
         ("2026-11-30T11:00:00+25:00 1.0", "line 1: .* is no date and time"),
+        ("0001-01-01T00:00:00+14:00 1.0", "line 1: .* is no date and time"),
+        ("9999-12-31T23:59:59-14:00 1.0", "line 1: .* is no date and time"),
         ("2026-11-30 11:00,1,0\n", "line 1: '2026-11-30 11:00,1,0' is not of the form"),
         ("time (UTC+1);level\n", "line 1: the table states the time zone 'UTC\\+1'; times must be UTC"),
         ("# of a gauge\nlocal time;level\n", "line 2: the table states the time zone 'local'"),
