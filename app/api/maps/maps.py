@@ -22,6 +22,7 @@ from app.api.state import EdgeState, Service, State
 from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.pictures.overlay import overlay_png
 from app.mapping.s44 import Order
+from app.missions.errors import InvalidRequestError
 from app.missions.maps.products import (
     CONTOURS,
     CROSSOVERS,
@@ -92,7 +93,7 @@ async def _file_options(
     ] = None,
 ) -> ProductOptions:
     if (min is None) != (max is None) or (min is not None and max is not None and not min < max):
-        raise ProblemError("invalid-request", f"the colour range is {min} to {max}", remedy="Give min and a max above")
+        raise InvalidRequestError("max", f"the colour range is {min} to {max}", "Give min and a max above")
     return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle, crs)
 
 
@@ -204,7 +205,7 @@ async def get_overlay(
     Give both `min` and `max` to keep the colours of two pictures comparable.
     """
     if min is not None and max is not None and max <= min:
-        raise ProblemError("invalid-request", f"max is {max:g} but min is {min:g}", remedy="Give a max above min")
+        raise InvalidRequestError("max", f"max is {max:g} but min is {min:g}", "Give a max above min")
     snapshot = await newest_map(mission, service.maps)
     tag = _tag(state, snapshot, [layer], order, min, max)
     if _matches(tag, if_none_match):
@@ -498,11 +499,11 @@ _add_files("lines", "getLinesFile", "Download the log of lines", "Return the lin
 
 
 def layer_of(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
-    """Return a layer. Raises ProblemError where the mission has none of that name."""
+    """Return a layer. Raises InvalidRequestError where the mission has none of that name."""
     kind = LAYERS[name]
     found = kind.of(snapshot.source(order))
     if found is None:
-        raise ProblemError("invalid-request", kind.absence, remedy=kind.remedy)
+        raise InvalidRequestError("layer", kind.absence, kind.remedy)
     return found
 
 

@@ -10,12 +10,13 @@ from pydantic import BaseModel, Field
 
 from app.api.access.auth import READERS, Reader, RoleCheck
 from app.api.http.links import link_root
-from app.api.http.problems import ProblemError, problems
+from app.api.http.problems import problems
 from app.api.maps.maps import End
 from app.api.mission import Mission
 from app.api.schemas import API, MissionId
 from app.api.state import Service, edge_state
 from app.mapping.coordinates.web_tiles import MAX_ZOOM, SIDE_PX, WebTile, finest_zoom
+from app.missions.errors import InvalidRequestError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.gis_layers import WEB_LAYERS, Range, WebLayer
 from app.missions.operations.maps.map_pictures import PictureRequest
@@ -194,35 +195,34 @@ def _first_zoom(finest: int) -> int:
 
 
 def _tile(z: int, x: int, y: int) -> WebTile:
-    """Return a tile. Raises ProblemError where there is none."""
+    """Return a tile. Raises InvalidRequestError where there is none."""
     try:
         return WebTile(z, x, y)
     except ValueError as error:
-        raise ProblemError("invalid-request", str(error), remedy="Ask for a tile that there is") from None
+        words = str(error)
+        raise InvalidRequestError(words[0], words, "Ask for a tile that there is") from None
 
 
 def _kind(layer: str) -> WebLayer:
     if layer not in WEB_LAYERS:
-        raise ProblemError(
-            "invalid-request", f"there are no tiles of a layer {layer!r}", remedy=f"Use one of {', '.join(WEB_LAYERS)}"
+        raise InvalidRequestError(
+            "layer", f"there are no tiles of a layer {layer!r}", f"Use one of {', '.join(WEB_LAYERS)}"
         )
     return WEB_LAYERS[layer]
 
 
 def _range(kind: WebLayer, spec: MissionSpec, low: float | None, high: float | None) -> Range:
-    """Return the colours' range. Raises ProblemError where there is none."""
+    """Return the colours' range. Raises InvalidRequestError where there is none."""
     usual = kind.default_range(spec)
     if not kind.unit:
         if low is not None or high is not None:
-            raise ProblemError(
-                "invalid-request",
+            raise InvalidRequestError(
+                "max" if low is None else "min",
                 f"the layer {kind.name} has classes, no range",
-                remedy="Leave min and max out",
+                "Leave min and max out",
             )
         return usual
     found = usual[0] if low is None else low, usual[1] if high is None else high
     if found[0] >= found[1]:
-        raise ProblemError(
-            "invalid-request", f"max is {found[1]:g} but min is {found[0]:g}", remedy="Give a max above min"
-        )
+        raise InvalidRequestError("max", f"max is {found[1]:g} but min is {found[0]:g}", "Give a max above min")
     return found

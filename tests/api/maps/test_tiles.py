@@ -88,23 +88,26 @@ async def test_a_range_of_ones_own_colours(client: httpx.AsyncClient, tiles: str
 
 
 @pytest.mark.parametrize(
-    "path",
+    ("path", "field"),
     [
-        "/depth/25/0/0.png",
-        "/depth/2/4/0.png",
-        "/depth/2/0/4.png",
-        "/depth/2/0/-1.png",
-        "/depth/2/0/1@3x.png",
-        "/bogus/2/0/1.png",
-        "/bogus.json",
-        "/depth.json?min=5&max=5",
-        "/density.json?min=1",
-        "/depth/2/0/1.png?max=-3",
+        ("/depth/25/0/0.png", "z"),
+        ("/depth/2/4/0.png", "x"),
+        ("/depth/2/0/4.png", "y"),
+        ("/depth/2/0/-1.png", "y"),
+        ("/depth/2/0/1@3x.png", "y"),
+        ("/bogus/2/0/1.png", "layer"),
+        ("/bogus.json", "layer"),
+        ("/depth.json?min=5&max=5", "max"),
+        ("/density.json?min=1", "min"),
+        ("/depth/2/0/1.png?max=-3", "max"),
     ],
 )
-async def test_what_there_is_not_is_refused(client: httpx.AsyncClient, mission: dict[str, Any], path: str) -> None:
+async def test_what_there_is_not_is_refused(
+    client: httpx.AsyncClient, mission: dict[str, Any], path: str, field: str
+) -> None:
     answer = await client.get(f"/missions/{mission['id']}/tiles{path}")
     assert (answer.status_code, answer.json()["type"]) == (422, "urn:bathyfleet:problem:invalid-request")
+    assert [fault["field"] for fault in answer.json()["errors"]] == [field]
 
 
 async def test_before_the_first_sounding_everything_is_transparent(
