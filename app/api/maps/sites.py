@@ -104,7 +104,10 @@ async def get_site(site_id: Site, service: Service, reader: Reader) -> SiteView:
 
 @router.patch("/{site_id}", operation_id="changeSite", summary="Change a site", responses=_SENT | _FOUND)
 async def change_site(site_id: Site, changes: SiteChanges, service: Service, operator: Operator) -> SiteView:
-    """Change name, area, cell or `yearly_change_m`; its map is made anew of its surveys, which stay as they are."""
+    """Change name, area, cell or `yearly_change_m`; its map is made anew of its surveys, which stay as they are.
+
+    An area that has no ground in common with one of its missions is refused.
+    """
     return await service.sites.change(site_id, changes)
 
 

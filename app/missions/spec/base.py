@@ -29,6 +29,10 @@ ShownName = Annotated[
 MAX_POSITIONS = 1000
 
 
+HALF_ROUND_DEG = 180.0
+"""An area that is wider crosses the line at which longitudes begin anew."""
+
+
 class FieldError(ValueError):
     """What is wrong with one field beside others.
 

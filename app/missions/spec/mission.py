@@ -20,7 +20,7 @@ from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.coordinates.georeference import MAX_EXTENT_M, LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
-from app.missions.spec.base import FieldError, Model, Name, PolygonGeometry, ShownName, cell_count
+from app.missions.spec.base import HALF_ROUND_DEG, FieldError, Model, Name, PolygonGeometry, ShownName, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.limits import Limits
@@ -84,8 +84,6 @@ class PlannerSpec(Model):
     )
 
 
-HALF_ROUND_DEG = 180.0
-"""An area that is wider crosses the line at which longitudes begin anew."""
 QUARTER_ROUND_DEG = 90.0
 """No latitude is larger."""
 

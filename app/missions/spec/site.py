@@ -9,7 +9,7 @@ from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.spec.base import Model, PolygonGeometry, ShownName, cell_count
+from app.missions.spec.base import HALF_ROUND_DEG, FieldError, Model, PolygonGeometry, ShownName, cell_count
 
 MAX_SITE_CELLS = 4_000_000
 """Of a site's grid: several surveys are taken together in memory."""
@@ -37,17 +37,29 @@ class SiteSpec(Model):
 
     @model_validator(mode="after")
     def _area_is_of_a_sensible_size(self) -> "SiteSpec":
-        size = self.local_area().max(axis=0)
+        lons, _ = zip(*self.area.ring, strict=True)
+        if max(lons) - min(lons) > HALF_ROUND_DEG:
+            raise FieldError(
+                "area",
+                f"it reaches from longitude {min(lons)} to {max(lons)}, and none that crosses 180 degrees is taken: "
+                "give the part on each side as a site of its own",
+            )
+        try:
+            size = self.local_area().max(axis=0)
+        except ValueError as error:
+            raise FieldError("area", f"{str(error).rpartition(': ')[0]}: choose a smaller one") from None
         cells = cell_count(size, self.cell_m)
         if min(size) < 2 * self.cell_m:
-            raise ValueError(
+            raise FieldError(
+                "cell_m",
                 f"the area is {size[0]:.1f} m x {size[1]:.1f} m, less than two cells of {self.cell_m} m: "
-                "enlarge it or make cell_m smaller"
+                "enlarge it or make cell_m smaller",
             )
         if cells > MAX_SITE_CELLS:
-            raise ValueError(
+            raise FieldError(
+                "cell_m",
                 f"the area of {size[0]:.0f} m x {size[1]:.0f} m has {cells:.0f} cells of {self.cell_m} m, at most "
-                f"{MAX_SITE_CELLS} are taken: make cell_m larger or the area smaller"
+                f"{MAX_SITE_CELLS} are taken: make cell_m larger or the area smaller",
             )
         return self
 

@@ -50,6 +50,11 @@ def soundings(
     return items
 
 
+def box(west: float, south: float, east: float, north: float) -> dict[str, Any]:
+    ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+    return {"type": "Polygon", "coordinates": [ring]}
+
+
 async def new_site(client: httpx.AsyncClient, **changes: Any) -> str:
     answer = await client.post("/sites", json=SITE | changes)
     assert answer.status_code == 201, answer.text
@@ -277,6 +282,41 @@ async def test_older_surveys_are_less_certain_where_the_operator_says_so(client:
     assert (known["rows"], known["known_pct"]) == (6, 100.0)
     refused = await client.patch(f"/sites/{site}", json={"cell_m": 0.001})
     assert (refused.status_code, "cells" in refused.text) == (422, True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "words"),
+    [
+        ({"cell_m": 0.001}, "cell_m", "make cell_m larger"),
+        ({"cell_m": 900.0}, "cell_m", "enlarge it"),
+        ({"area": box(0.0, 0.0, 5.0, 5.0)}, "area", "choose a smaller one"),
+        ({"area": box(-179.99, 0.0, 179.99, 0.01)}, "area", "the part on each side"),
+    ],
+)
+async def test_a_site_that_cannot_be_is_refused_with_its_field(
+    client: httpx.AsyncClient, changes: dict[str, Any], field: str, words: str
+) -> None:
+    site = await new_site(client)
+    for answer in (
+        await client.post("/sites", json=SITE | changes),
+        await client.patch(f"/sites/{site}", json=changes),
+    ):
+        assert answer.status_code == 422, answer.text
+        (fault,) = answer.json()["errors"]
+        assert (fault["field"], words in fault["expected"]) == (field, True), fault
+
+
+async def test_a_site_stays_where_its_missions_are(client: httpx.AsyncClient) -> None:
+    site = await new_site(client)
+    mission = await new_mission(client, site)
+    elsewhere = {"area": box(10.0, 10.0, 10.001, 10.001)}
+    refused = await client.patch(f"/sites/{site}", json=elsewhere)
+    assert refused.status_code == 422, refused.text
+    (fault,) = refused.json()["errors"]
+    assert (fault["field"], mission in fault["message"]) == ("area", True)
+    assert (await get(client, f"/sites/{site}"))["area"] == SITE["area"]
+    assert (await client.put(f"/missions/{mission}/site", json={"site": None})).status_code == 200
+    assert (await client.patch(f"/sites/{site}", json=elsewhere)).status_code == 200
 
 
 async def test_a_mission_counts_once_and_as_it_is_corrected_later(client: httpx.AsyncClient) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 from pydantic import ValidationError
 from shapely.geometry import Polygon
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.arrays import FloatArray
 from app.mapping.types import SoundingRows
@@ -17,6 +18,7 @@ from app.missions.maps.site_maps import SiteMap, moment
 from app.missions.operations.imports.imports import Imports
 from app.missions.operations.sites.site_models import SiteModels, stored_site
 from app.missions.running.final_maps import FinalMaps
+from app.missions.spec.base import FieldError
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.site import SiteChanges, SiteSpec, in_frame
 from app.missions.states import AT_SEA, ENDED
@@ -87,10 +89,9 @@ class Sites:
             try:
                 spec = await asyncio.to_thread(SiteSpec.model_validate, row.spec | given)
             except ValidationError as error:
-                first = error.errors(include_url=False)[0]
-                field = ".".join(str(part) for part in first["loc"]) or next(iter(given), "area")
-                words = first["msg"].removeprefix("Value error, ")
-                raise InvalidRequestError(field, words, "change the area or the cell, or both together") from None
+                raise _field_problem(error, next(iter(given), "area")) from None
+            if changes.area is not None:
+                await _check_missions(session, site_id, spec)
             row.name, row.spec, row.updated_at = spec.name, spec.model_dump(mode="json"), now()
         return await self.view(site_id)
 
@@ -181,6 +182,31 @@ class Sites:
         await self._imports.begin_with(live, rows, described)
         for note in notes[1:]:
             await live.journal.log(Level.WARNING, "site", note)
+
+
+def _field_problem(error: ValidationError, otherwise: str) -> InvalidRequestError:
+    """Return what is wrong with a site that is to be changed; of one field ``otherwise``."""
+    first = error.errors(include_url=False)[0]
+    reason = first.get("ctx", {}).get("error")
+    if isinstance(reason, FieldError):
+        words, _, advice = str(reason).rpartition(": ")
+        return InvalidRequestError(reason.field, words, advice)
+    field = ".".join(str(part) for part in first["loc"]) or otherwise
+    words = first["msg"].removeprefix("Value error, ")
+    return InvalidRequestError(field, words, "change the area or the cell, or both together")
+
+
+async def _check_missions(session: AsyncSession, site_id: str, site: SiteSpec) -> None:
+    """Refuse an area that has no ground in common with a mission of the site. Raises InvalidRequestError."""
+    for mission in await site_queries.missions_of(session, site_id):
+        row = await session.get_one(MissionRow, mission.id)
+        if not _meet(site, MissionSpec.model_validate(row.spec)):
+            raise InvalidRequestError(
+                "area",
+                f"mission {mission.name!r} ({mission.id}) of the site lies outside of it",
+                "give an area that has ground in common with each, or take the mission out first: "
+                "PUT /api/v1/missions/{id}/site",
+            )
 
 
 def _meet(site: SiteSpec, spec: MissionSpec) -> bool:
