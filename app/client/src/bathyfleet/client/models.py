@@ -405,7 +405,9 @@ class BeamPointsRequest(Model):
     least_angle_deg: float | None = None
     """Outer beams: at least so far to either side from straight down in the vehicle, degrees"""
     limit: int = 50000
-    """Most points in the answer. Of more beams those of every second ping, or fourth, and so on come"""
+    """Most points in the answer. Of more beams those of every second ping, or fourth, and so on come; where one ping
+    has more, some of its beams
+    """
 
 
 class BeamRulingRequest(Model):

@@ -451,6 +451,8 @@ export interface paths {
         /**
          * Change a site
          * @description Change name, area, cell or `yearly_change_m`; its map is made anew of its surveys, which stay as they are.
+         *
+         *     An area that has no ground in common with one of its missions is refused.
          */
         patch: operations["changeSite"];
         trace?: never;
@@ -2898,7 +2900,7 @@ export interface components {
             least_angle_deg?: number | null;
             /**
              * Limit
-             * @description Most points in the answer. Of more beams those of every second ping, or fourth, and so on come
+             * @description Most points in the answer. Of more beams those of every second ping, or fourth, and so on come; where one ping has more, some of its beams
              * @default 50000
              */
             limit: number;
