@@ -13,6 +13,9 @@ HOUR_S = 3600.0
 PLACE_S = 5.0
 """A vehicle is amid what it sounds within so many seconds."""
 
+SILENT_S = 1800.0
+"""Over a time in which nothing was sounded or fixed for longer, one step leads from its begin to its end."""
+
 FACTORS = (0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
 FACTOR_LOG_SD = 1.0
 """Vehicles drift more or less than usual by a factor whose logarithm has this deviation."""
@@ -117,7 +120,10 @@ class DriftNodes:
 
     @classmethod
     def along(cls, soundings: TrackSoundings, fixes: Fixes, spacing_s: float) -> "DriftNodes":
-        """Return nodes about so many seconds apart, from the first sounding or fix of each dive to its last."""
+        """Return nodes about so many seconds apart, from the first sounding or fix of each dive to its last.
+
+        None lies within a time that was silent for longer than :data:`SILENT_S`, years by a clock that was wrong.
+        """
         vehicle: list[int] = []
         dives: list[FloatArray] = []
         for one in np.unique(soundings.vehicle).tolist():
@@ -126,10 +132,10 @@ class DriftNodes:
             cuts = np.unique(fixes.time_s[(fixes.vehicle == one) & fixes.resets])
             low, high = min(at.min(), of_fixes.min(initial=np.inf)), max(at.max(), of_fixes.max(initial=-np.inf))
             cuts = cuts[(cuts > low) & (cuts < high)]
+            heard = np.unique(np.concatenate([at, of_fixes]))
             for begin, end in zip([low, *cuts], [*cuts, high], strict=True):
-                count = max(1, round((end - begin) / spacing_s))
                 vehicle.append(one)
-                dives.append(np.linspace(begin, end, count + 1))
+                dives.append(_node_times(begin, end, heard[(heard > begin) & (heard < end)], spacing_s))
         sizes = [len(times) for times in dives]
         places = [_places(soundings, one, times) for one, times in zip(vehicle, dives, strict=True)]
         return cls(
@@ -170,6 +176,18 @@ class DriftNodes:
         return sparse.csr_array((share.ravel(), (at, rows.ravel())), shape=(len(time_s), len(self)))
 
 
+def _node_times(begin: float, end: float, heard: FloatArray, spacing_s: float) -> FloatArray:
+    """Return the times of a dive's nodes; between ``begin`` and ``end`` something was heard at times ``heard`` (n,)."""
+    times = np.concatenate([[begin], heard, [end]])
+    breaks = np.flatnonzero(np.diff(times) > SILENT_S)
+    pieces = []
+    for first, last in zip(times[np.append(0, breaks + 1)], times[np.append(breaks, len(times) - 1)], strict=True):
+        alone = last == first and len(breaks) > 0
+        count = 0 if alone else max(1, round((last - first) / spacing_s))
+        pieces.append(np.linspace(first, last, count + 1))
+    return np.concatenate(pieces)
+
+
 def _places(soundings: TrackSoundings, vehicle: int, time_s: FloatArray) -> FloatArray:
     """Return where a vehicle was at the nodes of a dive (n,), (n, 2): amid what it sounded then, else between that."""
     begin = time_s[0]
@@ -178,12 +196,9 @@ def _places(soundings: TrackSoundings, vehicle: int, time_s: FloatArray) -> Floa
     )
     if not len(own):
         return np.zeros((len(time_s), 2))
-    piece = np.floor((own.time_s - begin) / PLACE_S).astype(np.int64)
+    _, piece = np.unique(np.floor((own.time_s - begin) / PLACE_S), return_inverse=True)
     count = np.bincount(piece)
-    seen = count > 0
-    at, east, north = (
-        np.bincount(piece, column)[seen] / count[seen] for column in (own.time_s - begin, own.east_m, own.north_m)
-    )
+    at, east, north = (np.bincount(piece, column) / count for column in (own.time_s - begin, own.east_m, own.north_m))
     return np.column_stack([np.interp(time_s - begin, at, east), np.interp(time_s - begin, at, north)])
 
 
@@ -219,15 +234,19 @@ def prior_rows(nodes: DriftNodes, fixes: Fixes, model: DriftModel) -> tuple[spar
     one = np.ones(len(joined))
     way = np.diff(nodes.place_m @ (1.0, 1.0j))[joined]
     walk_sd = np.maximum(model.walk_m * np.sqrt(step / HOUR_S), 1e-3)
+    # What a Gauss-Markov rate adds up to, given its values at both ends, however long the step is.
+    time_s = model.rate_time_s
+    of_ends = time_s * np.tanh(0.5 * step / time_s)
+    drifted_sd = rate_sd * np.sqrt(2.0 * time_s * np.maximum(step - 2.0 * of_ends, 0.0))
     add(
         [
             (joined + 1, one),
             (joined, -one),
-            (m + joined, -0.5 * step),
-            (m + joined + 1, -0.5 * step),
+            (m + joined, -of_ends),
+            (m + joined + 1, -of_ends),
             (2 * m + nodes.dive[joined], -way),
         ],
-        walk_sd,
+        np.hypot(walk_sd, drifted_sd),
     )
     kept = np.exp(-step / model.rate_time_s)
     add([(m + joined + 1, one), (m + joined, -kept)], rate_sd * np.sqrt(np.maximum(1.0 - kept**2, 1e-6)))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from app.arrays import FloatArray
-from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
+from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, drift, thinned
 from app.estimation.adjustment.drift import DriftNodes
 from app.estimation.adjustment.least_squares import LeastSquares, WeighedTies
 from app.estimation.adjustment.ties import Outcome, Tie
@@ -265,3 +265,30 @@ def test_deviations_are_those_of_each_node_by_itself(tied: bool) -> None:
     solution = problem.solve(ties)
     each = problem.covariances(solution, sparse.csr_array(np.eye(len(nodes))))
     np.testing.assert_allclose(problem.deviations(solution) ** 2, np.einsum("kii->ki", each), rtol=1e-6)
+
+
+def interrupted(silent_s: float) -> tuple[TrackSoundings, Fixes]:
+    """What a vehicle sounded in two lines with a silence between, before which its place was known."""
+    at_s = np.concatenate([np.arange(0.0, 300.0, 2.0), 300.0 + silent_s + np.arange(0.0, 300.0, 2.0)])
+    along, one = np.tile(np.arange(0.0, 300.0, 2.0), 2), np.ones(len(at_s))
+    soundings = TrackSoundings(np.zeros(len(at_s), dtype=np.int64), at_s, along, 20.0 * one, 9.0 * one, 0.1 * one)
+    begin = [np.zeros(1), np.zeros(1), np.zeros(1), np.full(1, 0.1), np.ones(1, dtype=bool)]
+    return soundings, Fixes(np.zeros(1, dtype=np.int64), *begin)
+
+
+@pytest.mark.parametrize("hours", [1.0, 4.0])
+def test_one_step_over_a_silence_drifts_as_many_small_ones(hours: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    once = adjusted(*interrupted(3600.0 * hours))
+    monkeypatch.setattr(drift, "SILENT_S", np.inf)
+    finely = adjusted(*interrupted(3600.0 * hours))
+    assert len(once.nodes) < 40 < 100 < len(finely.nodes)
+    at_once, in_small_steps = (
+        found.sd_m[[int(np.argmin(np.abs(found.nodes.time_s - 300.0))), -1]] for found in (once, finely)
+    )
+    np.testing.assert_allclose(at_once, in_small_steps, rtol=0.01)
+
+
+def test_a_clock_that_was_decades_off_makes_no_nodes_of_decades() -> None:
+    found = adjusted(*interrupted(20_000 * 86_400.0))
+    assert len(found.nodes) < 40
+    assert np.isfinite(found.offset_m).all()

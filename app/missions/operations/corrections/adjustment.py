@@ -51,10 +51,6 @@ REACH_M = 8.0
 FEWEST = 50
 """Soundings that there have to be."""
 
-DAY_S = 86_400.0
-MOST_DAYS = 31
-"""Drift is reckoned from a vehicle's first sounding to its last: a wrong clock can make years of it."""
-
 
 def adjustment_view(live: LiveMission) -> AdjustmentView:
     """Return by how much a mission's tracks are changed, and how that was found."""
@@ -85,8 +81,7 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
     Raises
     ------
     ConflictError
-        When there are too few soundings, a vehicle's clock was set back, so that two ways have the same times, or its
-        soundings are from more than MOST_DAYS.
+        When there are too few soundings, or a vehicle's clock was set back, so that two ways have the same times.
     InvalidRequestError
         When nothing is known of a vehicle at the time of a fix.
     PingsUnreadableError
@@ -101,7 +96,6 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
         await asyncio.to_thread(_refuse_set_back, places)
         told = await _positions(live)
         fixes = await asyncio.to_thread(_fixes, request.fixes, told, places, names, live.frame)
-        _refuse_years(soundings, fixes, names)
         model = DriftModel(walk_m=request.walk_m, rate_mph=request.rate_mph)
         found = await (asyncio.to_thread if live.compute is None else live.compute.run)(
             adjusted, soundings, fixes, model, cell_m=max(FINEST_M, live.spec.cell_m), reach_m=REACH_M
@@ -192,18 +186,6 @@ def _refuse_set_back(places: Places) -> None:
                 f"the clock of {name} was set back by {back_s:.0f} s: two of its ways have the same times, and an "
                 "adjustment goes by time",
                 "leave the tracks as they are, or import one of the two ways into a mission of its own",
-            )
-
-
-def _refuse_years(soundings: TrackSoundings, fixes: Fixes, names: Sequence[str]) -> None:
-    """Raise ConflictError where soundings and fixes of a vehicle are from a longer time than drift is reckoned over."""
-    for number, name in enumerate(names):
-        of = (soundings.time_s[soundings.vehicle == number], fixes.time_s[fixes.vehicle == number])
-        days = float(np.ptp(np.concatenate(of))) / DAY_S
-        if days > MOST_DAYS:
-            raise ConflictError(
-                f"{name} has soundings of {days:.0f} days by its clock, and an adjustment is over at most {MOST_DAYS}",
-                "leave the tracks as they are, or import what has other times into a mission of its own",
             )
 
 

@@ -87,13 +87,10 @@ async def test_a_map_bent_by_drift_is_straightened_and_bent_again(client: httpx.
     np.testing.assert_array_equal(await depths(client, path), bent)
 
 
-async def test_a_clock_that_was_years_off_is_refused_before_years_of_drift_are_reckoned(
-    client: httpx.AsyncClient,
-) -> None:
+async def test_a_clock_that_was_decades_off_for_a_sounding_holds_nothing_up(client: httpx.AsyncClient) -> None:
     path = await swath_mission(client)
     way, _ = ways()
     items = pinged_while_drifting("rover", way[:20], np.zeros((20, 2)))
     await post(client, path, [items[0] | {"time_s": items[0]["time_s"] - 86_400.0 * 20_000}, *items])
     answer = await client.post(f"{path}/adjustment")
-    assert (answer.status_code, answer.json()["type"]) == (409, "urn:bathyfleet:problem:conflict"), answer.text
-    assert "rover has soundings of 20000 days" in answer.json()["detail"]
+    assert answer.status_code == 200, answer.text
