@@ -26,7 +26,7 @@ from simulator.sonars.sensors import SensorKind, SonarNoise
 from simulator.sonars.swath import SwathSonar
 from simulator.targets import RangingNoise, TargetSpec
 from simulator.vehicles.battery import BatterySpec
-from simulator.water_column import WaterColumn
+from simulator.water_column import Water, WaterColumn
 
 NEW_BATTERY = BatterySpec()
 
@@ -167,8 +167,9 @@ def main(
             specs,
             equipment,
             speed=speed,
-            current=(east, north),
-            water=WaterColumn.of([_entry(text) for text in sound_speed.split(",") if text.strip()]),
+            water=Water(
+                (east, north), WaterColumn.of([_entry(text) for text in sound_speed.split(",") if text.strip()])
+            ),
             options=DuneOptions(
                 bind_address=bind,
                 announce_addresses=tuple(announce_address or ["127.0.0.1"]),

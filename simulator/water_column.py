@@ -108,3 +108,22 @@ class WaterColumn:
         edges = np.concatenate([[depth_m], depths[depths > depth_m], [np.inf]])
         upper, lower = np.minimum(edges[:-1], end_m), np.minimum(edges[1:], end_m)
         return lower - upper, np.interp(upper, depths, speeds), np.interp(lower, depths, speeds)
+
+
+@dataclass(frozen=True, slots=True)
+class Water:
+    """Water that vehicles swim in.
+
+    Attributes
+    ----------
+    current_mps
+        Its velocity over ground, (east, north).
+    column
+        How fast sound is in it; None: as fast as sonars assume, and no vehicle has a probe.
+    """
+
+    current_mps: tuple[float, float] = (0.0, 0.0)
+    column: WaterColumn | None = None
+
+
+STILL = Water()

@@ -23,7 +23,7 @@ from simulator.network import Address, UdpEndpoint
 from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
 from simulator.vehicles.battery import BatterySpec
 from simulator.vehicles.vehicle import STEP_S
-from simulator.water_column import WaterColumn
+from simulator.water_column import STILL, Water
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)
@@ -102,10 +102,8 @@ class DuneFleet:
         Vehicle seconds per wall second.
     equipment
         Of every vehicle; None: :data:`EQUIPMENT`.
-    current
-        Water velocity (east, north), m/s.
     water
-        How fast sound is in it; None: as fast as sonars assume, and no vehicle has a probe.
+        What they swim in.
     options
         Network side of the nodes.
     clock_offset_s
@@ -123,8 +121,7 @@ class DuneFleet:
         equipment: Equipment | None = None,
         *,
         speed: float = 1.0,
-        current: tuple[float, float] = (0.0, 0.0),
-        water: WaterColumn | None = None,
+        water: Water = STILL,
         options: DuneOptions | None = None,
         clock_offset_s: float = 0.0,
         seed: int = 0,
@@ -146,8 +143,8 @@ class DuneFleet:
                     rngs[2 * k],
                     equipment or EQUIPMENT,
                     heading_rad=spec.heading_rad,
-                    current=current,
-                    water=water,
+                    current=water.current_mps,
+                    water=water.column,
                     start_time_s=self._simulated_s,
                 ),
                 spec.imc_id,

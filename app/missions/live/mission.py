@@ -156,7 +156,6 @@ class LiveMission:
         )
         targets = self.target_views if spec.targets else None
         self.reports = VehicleReports(
-            row.id,
             self.frame,
             self.team,
             self.header,

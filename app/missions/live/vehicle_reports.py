@@ -56,7 +56,6 @@ class VehicleReports:
 
     def __init__(
         self,
-        mission_id: str,
         frame: LocalFrame,
         team: Team,
         header: MissionHeader,
@@ -68,7 +67,6 @@ class VehicleReports:
         changed: asyncio.Event,
         time_scale: float,
     ) -> None:
-        self._mission_id = mission_id
         self._frame = frame
         self._team = team
         self._header = header
@@ -228,7 +226,7 @@ class VehicleReports:
                 journal.note_line(journal.line(Level.INFO, "boundary", words, **data))
 
     def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
-        if event.mission_id != self._mission_id or member.order is None or event.step != member.order.step:
+        if event.mission_id != self._journal.mission_id or member.order is None or event.step != member.order.step:
             return
         if member.status is WaypointStatus.MISSED:
             return  # its vehicle acknowledged it, or came to its end, after it was given up

@@ -205,19 +205,19 @@ class Journal(WriteBehind[Noted]):
         pings = _of(PingReport, noted)
         _, pinged = await self.take_pings([await self._pings.judge(pings)] if pings else [], session)
         _, seen = await self.take_scans(_of(ScanReport, noted), session)
-        positions = [position_row(self._mission_id, report) for report in _of(VehicleReport, noted)]
+        positions = [position_row(self.mission_id, report) for report in _of(VehicleReport, noted)]
         await mission_queries.add_positions(session, positions)
         # With the track, so that a restart after a failure goes on from the same place with both.
         moved = {row["vehicle"] for row in positions} & self._flown.keys()
         flown = {name: self._flown[name].remember() for name in sorted(moved)}
-        await mission_queries.keep_flown(session, self._mission_id, flown)
-        samples = [{"mission_id": self._mission_id} | asdict(sample) for sample in _of(VehicleSample, noted)]
+        await mission_queries.keep_flown(session, self.mission_id, flown)
+        samples = [{"mission_id": self.mission_id} | asdict(sample) for sample in _of(VehicleSample, noted)]
         await telemetry_queries.add(session, samples)
         # Rows of a transaction that failed cannot be written again.
         rows = [_copy(row) for row in _of(EventRow, noted)]
         await add_lines(session, rows)
         for report in _of(WaypointReport, noted):
-            where = (self._mission_id, report.step, report.vehicle)
+            where = (self.mission_id, report.step, report.vehicle)
             await mission_queries.set_waypoint_status(
                 session, *where, report.status, report.reason, now(), begun=report.begun
             )
@@ -338,7 +338,7 @@ class Journal(WriteBehind[Noted]):
     def _begin_trouble(self, trouble: str) -> None:
         """Raise an alarm that nothing can be written: it is told before it can be stored."""
         words = f"nothing can be written down: {trouble}"
-        self._trouble = make_alarm(AlarmKind.DATABASE_UNWRITABLE, self._mission_id, words, now())
+        self._trouble = make_alarm(AlarmKind.DATABASE_UNWRITABLE, self.mission_id, words, now())
         self.alarms.noted(self._trouble)
 
     def _note_trouble(self, message: str) -> None:
@@ -355,7 +355,7 @@ class Journal(WriteBehind[Noted]):
         Lines of level alarm are made by :meth:`alarm_line`.
         """
         return EventRow(
-            mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data, alarm=None
+            mission_id=self.mission_id, time=now(), level=level, kind=kind, message=message, data=data, alarm=None
         )
 
     def alarm_line(self, kind: AlarmKind, message: str, *, event: str | None = None, **data: Any) -> EventRow:
@@ -364,7 +364,7 @@ class Journal(WriteBehind[Noted]):
         ``event`` is the line's kind where it is not the one that the table of alarms has.
         """
         row = self.line(Level.ALARM, event or ALARMS[kind].event, message, **data)
-        row.alarm = make_alarm(kind, self._mission_id, message, row.time, vehicle=data.get("vehicle"))
+        row.alarm = make_alarm(kind, self.mission_id, message, row.time, vehicle=data.get("vehicle"))
         return row
 
     def end_line(self, kinds: Sequence[AlarmKind], message: str, *, event: str | None = None, **data: Any) -> EventRow:
@@ -382,7 +382,7 @@ class Journal(WriteBehind[Noted]):
     def tell(self, row: EventRow) -> None:
         """Show a line that was written to everyone who watches."""
         metrics.EVENTS.labels(row.level).inc()
-        said = {"mission": self._mission_id, "level": str(row.level), "kind": row.kind, "message": row.message}
+        said = {"mission": self.mission_id, "level": str(row.level), "kind": row.kind, "message": row.message}
         log.info("mission event", **(row.data | said))
         self._broadcaster.publish(EventMessage(event=event_view(row)))
         if row.alarm is not None:
@@ -416,7 +416,7 @@ class Journal(WriteBehind[Noted]):
     ) -> tuple[list[PlacedSounding], list[dict[str, Any]]]:
         """Return soundings as the gate judges them, and how they are stored."""
         gated, received = gate.check(reports), now()
-        rows = [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
+        rows = [_row(self.mission_id, self.step, received, item) for item in gated if _storable(item)]
         return gated, [row | {"log": log} for row in rows]
 
     def _count(self, gated: Sequence[PlacedSounding], new: set[sounding_queries.Identity]) -> None:

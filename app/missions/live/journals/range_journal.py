@@ -60,7 +60,7 @@ class RangeJournal(WriteBehind[Arrived]):
             return
         if step is not None and step.targets is not None:
             self.last_id = self.tracking.recall(step.targets)
-        rows = await range_queries.ranges_after(session, self._mission_id, self.last_id)
+        rows = await range_queries.ranges_after(session, self.mission_id, self.last_id)
         self.tracking.replay(
             [
                 Arrived(
@@ -118,7 +118,7 @@ class RangeJournal(WriteBehind[Arrived]):
         """
         order = sorted(range(len(arrived)), key=lambda i: arrived[i].at_s)
         identities = {i: self._identity(arrived[i].report) for i in order}
-        seen = await range_queries.known_ranges(session, self._mission_id, list(identities.values()))
+        seen = await range_queries.known_ranges(session, self.mission_id, list(identities.values()))
         fresh = []
         for i in order:
             if identities[i] not in seen:
@@ -151,7 +151,7 @@ class RangeJournal(WriteBehind[Arrived]):
     def _row(self, judged: Judged) -> dict[str, Any]:
         report = judged.arrived.report
         return {
-            "mission_id": self._mission_id,
+            "mission_id": self.mission_id,
             "target": judged.target,
             "vehicle": report.vehicle,
             "time_s": report.time_s,

@@ -95,14 +95,14 @@ class SoundSpeedJournal(WriteBehind[SoundSpeedReport]):
 
     async def _store(self, noted: Sequence[SoundSpeedReport], session: AsyncSession) -> Committed:
         if self._counts is None:
-            self._counts = await sound_speed_queries.counts(session, self._mission_id)
+            self._counts = await sound_speed_queries.counts(session, self.mission_id)
         counts, full = dict(self._counts), set()
         await sound_speed_queries.add(session, [self._row(report) for report in noted])
         for report in noted:
             counts[report.vehicle] = counts.get(report.vehicle, 0) + 1
         for vehicle in {report.vehicle for report in noted}:
             while counts[vehicle] > MOST_SAMPLES:
-                await sound_speed_queries.halve(session, self._mission_id, vehicle)
+                await sound_speed_queries.halve(session, self.mission_id, vehicle)
                 counts[vehicle] -= counts[vehicle] // 2
                 full.add(vehicle)
 
@@ -116,7 +116,7 @@ class SoundSpeedJournal(WriteBehind[SoundSpeedReport]):
     def _row(self, report: SoundSpeedReport) -> dict[str, object]:
         place = report.position
         return {
-            "mission_id": self._mission_id,
+            "mission_id": self.mission_id,
             "vehicle": report.vehicle,
             "source": report.source[:64],
             "time_s": report.time_s,

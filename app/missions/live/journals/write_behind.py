@@ -41,7 +41,7 @@ class WriteBehind(ABC, Generic[T]):
         self.writing = asyncio.Lock()
         """Held while anything of this kind is judged and stored, so that nothing changes under it."""
         self._database = database
-        self._mission_id = mission_id
+        self.mission_id = mission_id
         self._period_s = period_s
         self._noted: list[T] = []
         self._pump: asyncio.Task[None] | None = None
@@ -88,7 +88,7 @@ class WriteBehind(ABC, Generic[T]):
             self.storage.note(error)
             log.error(
                 "what was heard last is lost, it could not be written",
-                mission=self._mission_id,
+                mission=self.mission_id,
                 lost=dict(Counter(type(item).__name__ for item in self._noted)),
                 why=self.storage.trouble,
             )
@@ -101,5 +101,5 @@ class WriteBehind(ABC, Generic[T]):
             except MissionElsewhereError:
                 return  # nothing more is ours to write
             except Exception:
-                log.exception("could not write to the database, trying again", mission=self._mission_id)
+                log.exception("could not write to the database, trying again", mission=self.mission_id)
                 await asyncio.sleep(RETRY_S)
