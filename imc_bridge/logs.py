@@ -304,7 +304,10 @@ class VehicleLog:
             if states and states.most_common(1)[0][0] in names:
                 break
         if not self.file.packets:
-            raise LogError(f"{self._path.name} holds no IMC packet", "give a DUNE log: Data.lsf or Data.lsf.gz")
+            raise LogError(
+                f"{self._path.name} holds no IMC packet",
+                "give a DUNE log, Data.lsf or Data.lsf.gz; a multibeam's own file has to be called .gsf or .kmall",
+            )
         if not states:
             raise LogError(f"{self._path.name} holds no EstimatedState", "give the log that DUNE wrote on the vehicle")
         own = states.most_common(1)[0][0]

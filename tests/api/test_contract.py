@@ -50,6 +50,7 @@ BEYOND_THE_SCHEMA = {
     "forecastDescription",
     "forecastMission",
     "getMap",
+    "getMeasuredCasts",
     "getMapOverlay",
     "getContoursFile",
     "getMapFile",

@@ -14,7 +14,7 @@ from app.api.mission import Mission
 from app.api.schemas import API, VehicleName
 from app.api.state import Service
 from app.mapping.s44 import Order
-from app.missions.errors import MapNotReadyError
+from app.missions.errors import InvalidRequestError, MapNotReadyError
 from app.missions.operations.corrections import adjustment, casts, measured_casts, patch_test, recorrection
 from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.recorrection import corrections_view
@@ -114,6 +114,8 @@ async def get_measured_casts(
 
     None counts before it is added. Where a log was imported, it stands for what its vehicle sent meanwhile.
     """
+    if from_s is not None and until_s is not None and from_s > until_s:
+        raise InvalidRequestError("from_s", f"{from_s:g} is after until_s, {until_s:g}", "swap them")
     return await measured_casts.vehicles_casts(mission, vehicle=vehicle, from_s=from_s, until_s=until_s)
 
 

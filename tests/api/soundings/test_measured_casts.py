@@ -116,8 +116,10 @@ async def test_casts_are_of_a_vehicle_and_a_time(client: httpx.AsyncClient, path
     assert down["lag_mps"] is None
     assert datetime.fromisoformat(down["time"]).timestamp() == pytest.approx(BEGIN_S + 75.0, abs=10.0)
     assert await measured(client, path, from_s=BEGIN_S + 1000.0) == []
-    answer = await client.get(f"{path}/sound-speed/measured", params={"from_s": "nan"})
-    assert answer.status_code == 422
+    for wrong in ({"from_s": "nan"}, {"from_s": BEGIN_S + 1.0, "until_s": BEGIN_S}):
+        answer = await client.get(f"{path}/sound-speed/measured", params=wrong)
+        assert answer.status_code == 422
+        assert [error["field"] for error in answer.json()["errors"]] == ["from_s"]
 
 
 async def test_nonsense_of_a_vehicle_never_becomes_a_cast(client: httpx.AsyncClient, path: str) -> None:
