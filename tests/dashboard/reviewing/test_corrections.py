@@ -226,9 +226,11 @@ def test_a_cast_that_a_vehicle_sent_is_shown_as_a_profile_and_added(
     sent.get_by_role("button", name="Fill in").click()
     assert service.get(f"/missions/{surveyed}/corrections")["sound_speed"] is None, "it is not applied yet"
     expect(by_id(page, "cast-time")).to_have_value(re.compile(r"^2026-11-21 0\d:\d\d"))
-    by_id(page, "cast-add").click()
+    sent.get_by_role("button", name="Add").click()
     expect(by_id(page, "cast")).to_have_count(1)
-    assert service.get(f"/missions/{surveyed}/corrections")["sound_speed"]["source"] == "rover rest"
+    expect(sent.get_by_role("button", name="Add")).to_have_count(0)
+    told = service.get(f"/missions/{surveyed}/corrections")["sound_speed"]
+    assert (told["source"], told["assumed_mps"]) == ("rover rest", 1500.0)
 
 
 def test_casts_are_added_from_files_changed_and_removed(watched: Watched, service: Service, surveyed: str) -> None:

@@ -97,6 +97,7 @@ export const REVIEW = {
     pt: "De {before} para {after} a profundidade do feixe exterior a {depth} difere {difference}, mais de metade da TVU da ordem {order} ({limit}). Falta um perfil entre eles.",
   },
   "casts.measured": { en: "Measured by vehicles", pt: "Medidos por veículos" },
+  "casts.addMeasured": { en: "Add", pt: "Acrescentar" },
   "casts.fillIn": { en: "Fill in", pt: "Preencher" },
   "casts.speeds": {
     en: "{samples} speeds, ± {sd} m/s",

@@ -63,6 +63,15 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
     form.text.value = written(cast.profile);
     form.source.value = source;
   };
+  const add = (casts: NewCasts["casts"]) => {
+    const assumed_mps = found.sound_speed?.assumed_mps ?? numberOf(assumed);
+    if (assumed_mps === null) fault.value = say("corrections.typeNumbers");
+    else {
+      // The speed set in the sonars comes with the first casts; later ones leave it, and what others added, as it is.
+      const first = found.sound_speed ? {} : { assumed_mps };
+      void change((id) => api.addCasts(id, { casts, ...first }));
+    }
+  };
   const casts = list.value?.casts ?? [];
   return (
     <section class="casts" data-testid="casts" aria-label={say("casts.casts")}>
@@ -72,21 +81,17 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
       {casts.length > 1 && list.value ? (
         <RuleOf key={list.value.rule} list={list.value} busy={busy} change={change} fault={fault} />
       ) : null}
-      <MeasuredCasts show={show} fault={fault} />
-      <CastForm
-        found={found}
-        form={form}
-        busy={busy}
-        change={change}
-        fault={fault}
-        assumed={assumed}
-        show={show}
-      />
+      <MeasuredCasts names={casts.map(({ name }) => name)} busy={busy} show={show} add={add} fault={fault} />
+      <CastForm form={form} busy={busy} fault={fault} show={show} add={add} />
     </section>
   );
 }
 
+/** Puts a cast into the fields. */
 export type Shown = (cast: Cast, name: string, source: string) => void;
+
+/** Adds casts, or replaces those of the same names. */
+export type Added = (casts: NewCasts["casts"]) => void;
 
 /** A time, ISO 8601 in UTC, as it is typed: seconds where there are any. */
 const typedTime = (time: string): string => time.slice(0, 19).replace("T", " ").replace(/:00$/, "");
@@ -209,12 +214,13 @@ function RuleOf({ list, busy, change, fault }: RuleProps) {
   );
 }
 
-interface FormProps extends CastsProps {
+interface FormProps extends Pick<CastsProps, "busy" | "fault"> {
   form: Record<"name" | "time" | "lat" | "lon" | "text" | "source", Signal<string>>;
   show: Shown;
+  add: Added;
 }
 
-function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps) {
+function CastForm({ form, busy, fault, show, add }: FormProps) {
   const read = (name: string, text: string) => {
     const [cast, ...others] = castsOf(text);
     fault.value = cast ? "" : say("corrections.noProfile");
@@ -223,19 +229,10 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
     // Several sections stay as they are written, each with its own time and place.
     if (others.length) form.text.value = text;
   };
-  const add = () => {
+  const addTyped = () => {
     const casts = typedCasts(form);
-    if (typeof casts === "string") {
-      fault.value = casts;
-      return;
-    }
-    const assumed_mps = found.sound_speed?.assumed_mps ?? numberOf(assumed);
-    if (assumed_mps === null) fault.value = say("corrections.typeNumbers");
-    else {
-      // The speed set in the sonars comes with the first casts; later ones leave it, and what others added, as it is.
-      const first = found.sound_speed ? {} : { assumed_mps };
-      void change((id) => api.addCasts(id, { casts, ...first }));
-    }
+    if (typeof casts === "string") fault.value = casts;
+    else add(casts);
   };
   return (
     <>
@@ -271,7 +268,7 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
       </label>
       {whyNotCommand.value ? null : (
         <p class="row">
-          <Button id="cast-add" commands busy={busy.value} onClick={add}>
+          <Button id="cast-add" commands busy={busy.value} onClick={addTyped}>
             {say("casts.add")}
           </Button>
           <FileButton accept=".asvp,.vel,.svp,.csv,.txt,.tsv" id="cast-file" onText={read}>

@@ -8,7 +8,7 @@ import { selectedId, view } from "../../state/store";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
 import { CastChart } from "./CastChart";
-import type { Shown } from "./Casts";
+import type { Added, Shown } from "./Casts";
 
 /** What vehicles send is looked at again after this time; logs are when they were imported. */
 const AGAIN_MS = 60_000;
@@ -16,8 +16,17 @@ const AGAIN_MS = 60_000;
 /** From this difference on the service takes only the way down, m/s. */
 const LAGS_MPS = 0.5;
 
-/** What vehicles measured of the sound's speed on their way; filled in, it can be added as a cast. */
-export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<string> }) {
+interface Props {
+  /** Of the casts that count. */
+  names: readonly string[];
+  busy: Signal<boolean>;
+  show: Shown;
+  add: Added;
+  fault: Signal<string>;
+}
+
+/** What vehicles measured of the sound's speed on their way: it is added as a cast, or filled in to be changed before. */
+export function MeasuredCasts({ names, busy, show, add, fault }: Props) {
   const found = useSignal<readonly VehicleCastView[]>([]);
   // Logs are imported, and taken back, meanwhile.
   const changed = useComputed(() => view.value.events.findLast(({ kind }) => kind === "import")?.id);
@@ -48,14 +57,21 @@ export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<stri
             <span>
               <b>{cast.vehicle}</b> {about(cast)}
             </span>
-            <Button
-              id="cast-fill-in"
-              onClick={() =>
-                show({ ...cast, profile: cast.profile as Cast["profile"] }, nameOf(cast), sourceOf(cast))
-              }
-            >
-              {say("casts.fillIn")}
-            </Button>
+            <span class="row">
+              {names.includes(nameOf(cast)) ? null : (
+                <Button
+                  id="cast-add-measured"
+                  commands
+                  busy={busy.value}
+                  onClick={() => add([{ ...castOf(cast), name: nameOf(cast), source: sourceOf(cast) }])}
+                >
+                  {say("casts.addMeasured")}
+                </Button>
+              )}
+              <Button id="cast-fill-in" onClick={() => show(castOf(cast), nameOf(cast), sourceOf(cast))}>
+                {say("casts.fillIn")}
+              </Button>
+            </span>
             <details data-testid="cast-profile">
               <summary>{say("casts.profile")}</summary>
               <CastChart cast={cast} />
@@ -66,6 +82,12 @@ export function MeasuredCasts({ show, fault }: { show: Shown; fault: Signal<stri
     </>
   );
 }
+
+const castOf = ({ time, position, profile }: VehicleCastView): Cast => ({
+  time,
+  position,
+  profile: profile as Cast["profile"],
+});
 
 const nameOf = ({ vehicle, time }: VehicleCastView): string =>
   `${vehicle} ${time.slice(0, 16).replace("T", " ")}`;
