@@ -26,7 +26,7 @@ from simulator.sonars.sensors import SensorKind, SonarNoise
 from simulator.sonars.swath import SwathSonar
 from simulator.targets import RangingNoise, TargetSpec
 from simulator.vehicles.battery import BatterySpec
-from simulator.water_column import Water, WaterColumn
+from simulator.water_column import SeaWater, WaterColumn
 
 NEW_BATTERY = BatterySpec()
 
@@ -167,7 +167,7 @@ def main(
             specs,
             equipment,
             speed=speed,
-            water=Water(
+            water=SeaWater(
                 (east, north), WaterColumn.of([_entry(text) for text in sound_speed.split(",") if text.strip()])
             ),
             options=DuneOptions(

@@ -111,7 +111,7 @@ class WaterColumn:
 
 
 @dataclass(frozen=True, slots=True)
-class Water:
+class SeaWater:
     """Water that vehicles swim in.
 
     Attributes
@@ -126,4 +126,4 @@ class Water:
     column: WaterColumn | None = None
 
 
-STILL = Water()
+STILL = SeaWater()

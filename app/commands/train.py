@@ -41,7 +41,7 @@ def train(
     from app.evaluation.pcao.training.scoring import DaskScorer, LocalScorer, Scorer
     from app.evaluation.pcao.training.training import Checkpoint, CheckpointError, Curve, make_optimiser, write_model
     from app.evaluation.pcao.training.training import train as run_training
-    from app.evaluation.runs.cluster import Cluster, ClusterError
+    from app.evaluation.runs.cluster import ClusterError, RunCluster
     from app.evaluation.runs.command import progress_bar
     from app.exploration.pcao.model import Training
     from simulator.floors.terrain import TerrainError
@@ -79,7 +79,7 @@ def train(
         optimiser = make_optimiser(method, seed)
         scorer: Scorer = LocalScorer(task, jobs or os.cpu_count() or 1)
         if scheduler is not None:
-            cluster = Cluster(scheduler)
+            cluster = RunCluster(scheduler)
             scorer = DaskScorer(task, cluster)
         with progress_bar() as bar:
             task_id = bar.add_task("train", total=iterations)

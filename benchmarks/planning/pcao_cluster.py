@@ -19,7 +19,7 @@ from app.evaluation.pcao.simulation.world import SeaFloor
 from app.evaluation.pcao.terrains import sea_floor
 from app.evaluation.pcao.training.scoring import DaskScorer
 from app.evaluation.pcao.training.training import make_optimiser
-from app.evaluation.runs.cluster import Cluster
+from app.evaluation.runs.cluster import RunCluster
 from benchmarks.common.report import PLANNING, make_parser, write_section
 
 ROUNDS = 2
@@ -50,7 +50,7 @@ def measure(workers: int, seed: int) -> dict[str, float]:
     processor: dict[int, float] = {}
     for count in (1, workers):
         with LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None) as local:
-            cluster = Cluster(local.scheduler_address)
+            cluster = RunCluster(local.scheduler_address)
             with Client(local.scheduler_address, set_as_default=False) as client:
                 pids = list(client.run(os.getpid).values())
             scorer = DaskScorer(task, cluster)

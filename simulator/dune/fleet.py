@@ -23,7 +23,7 @@ from simulator.network import Address, UdpEndpoint
 from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
 from simulator.vehicles.battery import BatterySpec
 from simulator.vehicles.vehicle import STEP_S
-from simulator.water_column import STILL, Water
+from simulator.water_column import STILL, SeaWater
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)
@@ -121,7 +121,7 @@ class DuneFleet:
         equipment: Equipment | None = None,
         *,
         speed: float = 1.0,
-        water: Water = STILL,
+        water: SeaWater = STILL,
         options: DuneOptions | None = None,
         clock_offset_s: float = 0.0,
         seed: int = 0,

@@ -73,7 +73,7 @@ class TieFound:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutTies:
     """How well sections fit that were left out, RMS of depths less the others' (m).
 
     By positions as they were, by fixes alone, and by fixes and all other ties.
@@ -118,7 +118,7 @@ class AdjustedTracks:
     sd_m: FloatArray
     before_sd_m: FloatArray
     ties: tuple[TieFound, ...]
-    held_out: HeldOut | None
+    held_out: HeldOutTies | None
     by_ties: bool
 
     def at(self, vehicle: int, time_s: FloatArray) -> FloatArray:
@@ -254,7 +254,7 @@ class _Adjustment:
             found.append(KnownShift(mean, covariance))
         return found
 
-    def compare(self, held: BoolArray, by_fixes: Solution, tried: Solution) -> HeldOut | None:
+    def compare(self, held: BoolArray, by_fixes: Solution, tried: Solution) -> HeldOutTies | None:
         """Return how well sections (k,) fit that were left out; None where too few overlap with others."""
         which = np.flatnonzero(held).tolist()
         sets = [self._residuals(which, offset) for offset in (0.0 * tried.offset_m, by_fixes.offset_m, tried.offset_m)]
@@ -266,7 +266,7 @@ class _Adjustment:
         # Logarithms: one steep place is not to decide alone.
         better = 0.5 * np.log((squares[:, 1] + 1e-6) / (squares[:, 2] + 1e-6))
         error = float(np.std(better, ddof=1)) / np.sqrt(len(better))
-        return HeldOut(len(both), float(raw), float(fixed), float(after), float(np.mean(better) / max(error, 1e-9)))
+        return HeldOutTies(len(both), float(raw), float(fixed), float(after), float(np.mean(better) / max(error, 1e-9)))
 
     def _residuals(self, which: list[int], offset_m: FloatArray) -> list[FloatArray]:
         east, north = self.places(offset_m)

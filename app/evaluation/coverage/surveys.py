@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 
 from app.arrays import FloatArray
-from app.evaluation.coverage.world import CRUISE_M, CoverageScenario, Craft, Fleet
+from app.evaluation.coverage.world import CRUISE_M, CoverageScenario, Fleet, SurveyCraft
 from app.exploration.lines.lattice import longer_axis_rad
 from app.exploration.swath.raster import Axes
 from app.exploration.swath.survey import SwathSurvey
@@ -146,13 +146,13 @@ def fly_from_edges(scenario: CoverageScenario) -> Fleet:
     return fleet
 
 
-def _fly_nearer(fleet: Fleet, craft: Craft, path: FloatArray) -> None:
+def _fly_nearer(fleet: Fleet, craft: SurveyCraft, path: FloatArray) -> None:
     """Fly a line from its nearer end."""
     back = np.hypot(*(path[-1] - craft.pose[:2])) < np.hypot(*(path[0] - craft.pose[:2]))
     fleet.fly_along(craft, path[::-1] if back else path)
 
 
-def _in_line(craft: Craft, end: FloatArray, ahead: FloatArray) -> bool:
+def _in_line(craft: SurveyCraft, end: FloatArray, ahead: FloatArray) -> bool:
     """Whether a leg goes on in the direction of the line."""
     leg, line = end - craft.pose[:2], ahead[1] - ahead[0]
     cosine = float(leg @ line) / max(float(np.hypot(*leg) * np.hypot(*line)), 1e-9)

@@ -134,7 +134,7 @@ def cell_by_depth_m(terrain: Terrain) -> float:
 
 
 @dataclass
-class Craft:
+class SurveyCraft:
     """One vehicle: its pose (3,), its time, and how far it flew."""
 
     pose: FloatArray
@@ -154,7 +154,7 @@ class Fleet:
 
     scenario: CoverageScenario
     density: DensityGrid = field(init=False)
-    crafts: dict[str, Craft] = field(init=False)
+    crafts: dict[str, SurveyCraft] = field(init=False)
 
     def __post_init__(self) -> None:
         scenario = self.scenario
@@ -164,7 +164,7 @@ class Fleet:
         self._angles = scenario.sonar.angles_rad
         begin = _first_place(scenario, self.wanted)
         self.crafts = {
-            name: Craft(np.array([begin[0] + 5.0 * k, begin[1], 0.0])) for k, name in enumerate(scenario.names)
+            name: SurveyCraft(np.array([begin[0] + 5.0 * k, begin[1], 0.0])) for k, name in enumerate(scenario.names)
         }
         for craft in self.crafts.values():
             self._ping(craft.pose[None])
@@ -178,7 +178,7 @@ class Fleet:
         depth = depth if prior_m is None else np.where(np.isfinite(depth), depth, prior_m)
         return Coverage(grid.west_m, grid.south_m, grid.cell_m, self.wanted, self.wanted & ~left, depth).planned_on()
 
-    def fly_to(self, craft: Craft, place_m: FloatArray, heading_rad: float | None) -> None:
+    def fly_to(self, craft: SurveyCraft, place_m: FloatArray, heading_rad: float | None) -> None:
         """Fly to a place (2,): in a shortest way with turning circles where a heading is asked for, else straight."""
         if heading_rad is None:
             poses, length_m = _straight(craft.pose, place_m, self._spacing_m, self.scenario.flying.radius_m)
@@ -198,12 +198,12 @@ class Fleet:
         craft.flown_m += length_m
         craft.time_s += length_m / self.scenario.speed_mps
 
-    def take_in(self, craft: Craft) -> None:
+    def take_in(self, craft: SurveyCraft) -> None:
         """Take in what a vehicle has sounded up to where it is."""
         poses, craft.unseen = craft.unseen, np.zeros((0, 3))
         self._ping(poses)
 
-    def fly_along(self, craft: Craft, path: FloatArray) -> None:
+    def fly_along(self, craft: SurveyCraft, path: FloatArray) -> None:
         """Fly a line (k, 2): to its beginning by turning circles, then along it."""
         self.fly_to(craft, path[0], float(np.arctan2(*(path[1] - path[0]))))
         for place in path[1:]:

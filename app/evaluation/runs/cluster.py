@@ -17,7 +17,7 @@ class ClusterError(Exception):
     """The cluster cannot be used; ``str()`` says why and what to do."""
 
 
-class Cluster:
+class RunCluster:
     """Workers behind a scheduler's address, ``tcp://HOST:PORT``."""
 
     def __init__(self, address: str) -> None:

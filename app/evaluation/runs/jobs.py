@@ -6,7 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any, Protocol
 
 from app.estimation import Sensor
-from app.evaluation.runs.cluster import Cluster
+from app.evaluation.runs.cluster import RunCluster
 from app.exploration.planners import warm_up
 
 Progress = Callable[[int], None]
@@ -48,7 +48,7 @@ def run_jobs(
     cluster's workers do the jobs; raises ClusterError when there is none.
     """
     if scheduler is not None:
-        cluster = Cluster(scheduler)
+        cluster = RunCluster(scheduler)
         try:
             for job, result in zip(jobs, cluster.imap(_run, jobs), strict=True):
                 progress(job, job.steps)

@@ -126,7 +126,7 @@ def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArr
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutSoundings:
     """Soundings predicted as if nothing had been sounded around them; all (h,) but ``points_m``, (h, 2).
 
     Attributes
@@ -162,7 +162,9 @@ def across_gaps(levels: TwoLevels, rows: IntArray, neighbours: tuple[int, int], 
     return levels.neighbours_beyond(levels.points[rows], np.maximum(radius, 1e-6), *neighbours)
 
 
-def hold_out_beyond(process: Conditioned, rows: IntArray, neighbours: tuple[int, int], farthest_m: float) -> HeldOut:
+def hold_out_beyond(
+    process: Conditioned, rows: IntArray, neighbours: tuple[int, int], farthest_m: float
+) -> HeldOutSoundings:
     """Predict the fine soundings ``rows`` as if the survey ended up to ``farthest_m`` before them."""
     even = _evenly(len(rows))
     course = 2.0 * np.pi * ((0.5 + np.sqrt(2.0) * np.arange(len(rows))) % 1.0)
@@ -178,7 +180,7 @@ def _evenly(n: int) -> FloatArray:
     return np.asarray((0.5 + GOLDEN * np.arange(n)) % 1.0)
 
 
-def predicted_without(process: Conditioned, rows: IntArray, neighbours: IntArray) -> HeldOut:
+def predicted_without(process: Conditioned, rows: IntArray, neighbours: IntArray) -> HeldOutSoundings:
     """Predict the fine soundings ``rows`` from the given ones, (h, k), -1 for none."""
     points, metric, amplitude, _ = process.sounded
     error, noise_part, model_part = krige_holes(
@@ -193,12 +195,12 @@ def predicted_without(process: Conditioned, rows: IntArray, neighbours: IntArray
     )
     known = np.isfinite(error)
     own = process.noise_variance[rows]
-    return HeldOut(points[rows[known]], error[known], own[known], (noise_part + model_part - own)[known])
+    return HeldOutSoundings(points[rows[known]], error[known], own[known], (noise_part + model_part - own)[known])
 
 
-def together(one: HeldOut, other: HeldOut) -> HeldOut:
+def together(one: HeldOutSoundings, other: HeldOutSoundings) -> HeldOutSoundings:
     """Return the predictions of both."""
-    return HeldOut(
+    return HeldOutSoundings(
         *(
             np.concatenate([getattr(one, name), getattr(other, name)])
             for name in ("points_m", "error_m", "own_variance", "map_variance")
@@ -206,7 +208,7 @@ def together(one: HeldOut, other: HeldOut) -> HeldOut:
     )
 
 
-def misses(held_out: HeldOut, factor: FloatArray) -> HoleErrors:
+def misses(held_out: HeldOutSoundings, factor: FloatArray) -> HoleErrors:
     """Return how predictions miss place by place, where the process has ``factor`` (h,) times its variance."""
     variance = held_out.map_variance * factor
     return HoleErrors(
@@ -216,18 +218,18 @@ def misses(held_out: HeldOut, factor: FloatArray) -> HoleErrors:
     )
 
 
-def error_ratio(refined: HeldOut, plain: HeldOut) -> float:
+def error_ratio(refined: HeldOutSoundings, plain: HeldOutSoundings) -> float:
     """Root mean square error of one process over another's on the same soundings; 1 where there are none."""
     expected = plain.own_variance + plain.map_variance
     below = float(np.sum(plain.error_m**2 / expected))
     return math.sqrt(float(np.sum(refined.error_m**2 / expected)) / below) if below > 0.0 else 1.0
 
 
-def mixed(refined: HeldOut, plain: HeldOut, weight: float) -> HeldOut:
+def mixed(refined: HeldOutSoundings, plain: HeldOutSoundings, weight: float) -> HeldOutSoundings:
     """Predictions averaged, ``weight`` on the refined ones; their disagreement adds to the variance."""
     own = weight * refined.own_variance + (1.0 - weight) * plain.own_variance
     apart = refined.error_m - plain.error_m
-    return HeldOut(
+    return HeldOutSoundings(
         refined.points_m,
         plain.error_m + weight * apart,
         own,
@@ -235,7 +237,7 @@ def mixed(refined: HeldOut, plain: HeldOut, weight: float) -> HeldOut:
     )
 
 
-def checked_log_scale(held_out: HeldOut, factor: FloatArray) -> float:
+def checked_log_scale(held_out: HeldOutSoundings, factor: FloatArray) -> float:
     """Find the logarithm of the factor on deviations where the process has ``factor`` (h,) times its variance.
 
     With it 68 and 95 % of the held-out soundings lie within their intervals, on average of the two. Soundings

@@ -15,7 +15,7 @@ from app.mapping.gaussian_process.calibration import (
     APART_UNITS,
     MISSES_RANGE,
     Calibration,
-    HeldOut,
+    HeldOutSoundings,
     across_gaps,
     checked_log_scale,
     error_ratio,
@@ -346,7 +346,7 @@ class GaussianProcessMap:
             noise_scale=self.hyperparameters_.noise_scale,
         )
 
-    def _learn_calibration(self, calibration: Calibration, held_out: HeldOut) -> None:
+    def _learn_calibration(self, calibration: Calibration, held_out: HeldOutSoundings) -> None:
         """Learn from held-out soundings where the map misses by more than elsewhere, and by how much on the whole."""
         steepness = calibration.steepness_factor(held_out.points_m)
         found, reach = misses(held_out, steepness), REACH_UNITS * self._unit_m
@@ -374,7 +374,7 @@ class GaussianProcessMap:
                 squares += [] if square is None else [square]
         return likely_factor(squares)
 
-    def _predicted(self, rows: IntArray, neighbours: IntArray) -> HeldOut:
+    def _predicted(self, rows: IntArray, neighbours: IntArray) -> HeldOutSoundings:
         """Predict soundings from others as the map would."""
         plain = predicted_without(self._plain, rows, neighbours)
         if self._refined is None or self.refinement_ == 0.0:

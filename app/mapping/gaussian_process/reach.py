@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.gaussian_process.calibration import HeldOut
+from app.mapping.gaussian_process.calibration import HeldOutSoundings
 from app.mapping.kriging.levels import TwoLevels
 from app.mapping.kriging.neighbours import nearest
 
@@ -224,7 +224,7 @@ def strip_neighbours(levels: TwoLevels, rows: IntArray, half_width_m: float) -> 
     return found
 
 
-def likely_square(held_out: HeldOut, factor: FloatArray, log_scale: float, side_m: float) -> float | None:
+def likely_square(held_out: HeldOutSoundings, factor: FloatArray, log_scale: float, side_m: float) -> float | None:
     """Return how large the mean square of errors over their deviations may be; None where too few soundings tell.
 
     Parameters

@@ -16,7 +16,7 @@ from app.evaluation.pcao.simulation.world import SeaFloor
 from app.evaluation.pcao.terrains import sea_floor
 from app.evaluation.pcao.training.scoring import DaskScorer, LocalScorer
 from app.evaluation.pcao.training.training import Checkpoint, make_optimiser, train
-from app.evaluation.runs.cluster import Cluster, ClusterError
+from app.evaluation.runs.cluster import ClusterError, RunCluster
 from app.evaluation.runs.jobs import run_jobs
 from app.exploration.pcao.model import default_model
 
@@ -34,7 +34,7 @@ def workers() -> Iterator[Any]:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # a dying worker leaves sockets behind
 def test_a_worker_killed_in_training_costs_nothing(workers: Any, tmp_path: Path) -> None:
-    cluster = Cluster(workers.scheduler_address)
+    cluster = RunCluster(workers.scheduler_address)
     killed: list[Any] = []
 
     def kill_one(curve: Any) -> None:
@@ -68,4 +68,4 @@ def test_evaluations_on_a_cluster_are_those_made_here(workers: Any) -> None:
 def test_a_scheduler_that_is_not_there_is_named(unused_tcp_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.evaluation.runs.cluster.CONNECT_S", 0.3)
     with pytest.raises(ClusterError, match=rf"no Dask cluster answers at 'tcp://127.0.0.1:{unused_tcp_port}'"):
-        Cluster(f"tcp://127.0.0.1:{unused_tcp_port}")
+        RunCluster(f"tcp://127.0.0.1:{unused_tcp_port}")

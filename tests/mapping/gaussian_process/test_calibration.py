@@ -9,7 +9,7 @@ from app.mapping.compare import interval_coverage
 from app.mapping.gaussian_process.calibration import (
     FINE_RELIEF,
     Calibration,
-    HeldOut,
+    HeldOutSoundings,
     across_gaps,
     checked_log_scale,
     error_ratio,
@@ -27,12 +27,12 @@ ORDINARY = Field(COARSE, np.zeros((1, 4, 4)))
 NEUTRAL = Calibration(Field(COARSE, np.zeros((2, 4, 4))), Field(COARSE, np.ones((1, 4, 4))), ORDINARY)
 
 
-def held_out(true_factor: float, own_sd: float, n: int = 2000) -> HeldOut:
+def held_out(true_factor: float, own_sd: float, n: int = 2000) -> HeldOutSoundings:
     """Predictions that are ``true_factor`` times as far off as they say."""
     rng = np.random.default_rng(0)
     sd = rng.uniform(0.5, 2.0, n)
     error = true_factor * sd * rng.standard_normal(n) + own_sd * rng.standard_normal(n)
-    return HeldOut(rng.uniform(0, 40, (n, 2)), error, np.full(n, own_sd**2), sd**2)
+    return HeldOutSoundings(rng.uniform(0, 40, (n, 2)), error, np.full(n, own_sd**2), sd**2)
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.0, 1.7])
@@ -42,7 +42,7 @@ def test_the_factor_on_deviations_is_found(factor: float) -> None:
 
 
 def test_soundings_too_noisy_to_tell_change_nothing() -> None:
-    nothing = HeldOut(np.zeros((0, 2)), *np.zeros((3, 0)))
+    nothing = HeldOutSoundings(np.zeros((0, 2)), *np.zeros((3, 0)))
     assert checked_log_scale(held_out(3.0, 100.0, n=300), np.ones(300)) == pytest.approx(
         checked_log_scale(nothing, np.ones(0)), abs=0.01
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
-from app.mapping.gaussian_process.calibration import HeldOut
+from app.mapping.gaussian_process.calibration import HeldOutSoundings
 from app.mapping.gaussian_process.gp import GaussianProcessMap
 from app.mapping.gaussian_process.reach import SLOPE, UNCHECKED_FACTOR, Reach, likely_factor, likely_square, reach
 from app.mapping.kriging.levels import two_levels
@@ -109,10 +109,10 @@ def test_steep_ground_along_a_track_makes_more_uncertain_what_lies_beside_it() -
 def test_checks_that_fail_raise_the_factor_and_few_checks_leave_more_possible(too_small: float) -> None:
     rng = np.random.default_rng(7)
 
-    def held_out(count: int) -> HeldOut:
+    def held_out(count: int) -> HeldOutSoundings:
         error = too_small * rng.standard_normal(count)
         points = np.column_stack([10.0 * np.arange(count), np.zeros(count)])
-        return HeldOut(points, error, np.full(count, 1e-6), np.ones(count))
+        return HeldOutSoundings(points, error, np.full(count, 1e-6), np.ones(count))
 
     def factor(count: int) -> float:
         square = likely_square(held_out(count), np.ones(count), 0.0, 5.0)

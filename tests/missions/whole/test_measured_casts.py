@@ -16,7 +16,7 @@ from app.missions.spec.water import Cast, NewCasts
 from app.missions.states import MissionState
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.floors.seafloors import generate
-from simulator.water_column import Water, WaterColumn
+from simulator.water_column import SeaWater, WaterColumn
 from tests.support.missions.harbour import Harbour, act, until_state
 from tests.support.missions.specs import LAT, LON, make_spec, spec_json
 from tests.support.ports import free_ports
@@ -35,7 +35,7 @@ async def test_what_a_vehicle_measures_on_its_way_is_offered_as_a_cast(harbour_c
     floor = generate("slope", 0, width_m=150.0, height_m=150.0, origin=(LAT, LON))
     specs = default_specs(1, floor, base_port=base_port)
     options = DuneOptions(announce_ports=tuple(announce_ports))
-    water = Water(column=WaterColumn(((0.0, 1512.0), (50.0, 1412.0))))
+    water = SeaWater(column=WaterColumn(((0.0, 1512.0), (50.0, 1412.0))))
     async with DuneFleet(floor, specs, speed=SPEED, options=options, water=water) as fleet:
         service = await harbour_closed.open(imc=imc, time_scale=SPEED)
         (node,) = fleet.nodes

@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Polygon, box
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.node import FakeDune
 from simulator.floors import seafloors
-from simulator.water_column import Water
+from simulator.water_column import SeaWater
 from tests.support.faults.missions import FRAME, mission_of, started, steps_more
 from tests.support.faults.sea import IDS, LIMITS, NAMES, OURS, imc_vehicles
 from tests.support.faults.service import Service, service_in
@@ -68,7 +68,7 @@ async def left_alone(
         "TIME_SCALE": f"{speed:g}",
     }
     async with (
-        DuneFleet(floor, specs, speed=speed, water=Water(current), options=options, seed=seed) as fleet,
+        DuneFleet(floor, specs, speed=speed, water=SeaWater(current), options=options, seed=seed) as fleet,
         service_in(folder, settings=settings) as (service, api),
     ):
 

@@ -17,7 +17,7 @@ from simulator.dune.fleet import EQUIPMENT
 from simulator.floors import seafloors
 from simulator.floors.terrain import Terrain
 from simulator.network import NetworkFaults
-from simulator.water_column import Water
+from simulator.water_column import SeaWater
 from tests.support.ports import free_ports
 from tests.support.waiting import until
 
@@ -53,7 +53,7 @@ class Sea:
             speed=self.settings.time_scale,
             options=options,
             clock_offset_s=self.clock_offset_s,
-            water=Water(self.current),
+            water=SeaWater(self.current),
         )
         await self.running.start()
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from app.arrays import FloatArray
 from app.evaluation.pcao.simulation.task import TrainingTask
-from app.evaluation.runs.cluster import Cluster
+from app.evaluation.runs.cluster import RunCluster
 
 Cases = tuple[tuple[int, int], ...]
 
@@ -37,7 +37,7 @@ class LocalScorer:
 class DaskScorer:
     """Workers of a cluster. A worker that dies is made up for by the others: its runs are flown again."""
 
-    def __init__(self, task: TrainingTask, cluster: Cluster) -> None:
+    def __init__(self, task: TrainingTask, cluster: RunCluster) -> None:
         self._task = task
         self._cluster = cluster
         self._shared = cluster.share(task)
